@@ -8,7 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from ddagr_gym.errors import InputError
 from ddagr_gym.identification.noise import ChannelNoise, noise_about_lines
 from ddagr_gym.identification.signals import travel_speed
 from ddagr_gym.parameters import Robot, Sensors
@@ -32,9 +31,6 @@ def measured_sensors(recordings: Sequence[Recording], robot: Robot, sensors: Sen
         recordings: of one robot.
         robot: whose wheels tell the speed.
         sensors: nominal; noise is that of a sample at their rate.
-
-    Raises:
-        InputError: recordings without any motion to tell it by.
     """
     scale = math.sqrt(sensors.imu.sample_rate)
     axes = [f"specific_force_{axis}" for axis in "xy"]
@@ -65,22 +61,26 @@ def _resting(recordings: Sequence[Recording], channel: str) -> float:
     for recording in recordings:
         at_rest = noise_at_rest(recording, channel) if recording.has(channel) else None
         if at_rest is not None:
-            found.append(_density(ChannelNoise(at_rest.sigma, correlation=at_rest.correlation), recording.period))
+            noise = ChannelNoise(at_rest.sigma, correlation=at_rest.correlation)
+            found.append(_density(noise, _spacing(recording, channel)))
     return _joined(found)
 
 
 def _driving(recordings: Sequence[Recording], channels: Sequence[str]) -> list[float]:
-    """The same of channels on the way, about straight lines; InputError where it cannot be told."""
+    """The same of channels on the way, about straight lines."""
     known = [(recording, noise_about_lines(recording)) for recording in recordings]
-    joined = []
-    for channel in channels:
-        found = [_density(noise[channel], recording.period) for recording, noise in known if recording.has(channel)]
-        if any(not math.isfinite(value) for value in found):
-            raise InputError(
-                f"the noise of {channel} cannot be told from these recordings: check them with `ddagr check`."
-            )
-        joined.append(_joined(found))
-    return joined
+
+    def densities(channel: str) -> list[float]:
+        having = [(recording, noise[channel]) for recording, noise in known if recording.has(channel)]
+        return [_density(noise, _spacing(recording, channel)) for recording, noise in having]
+
+    return [_joined(densities(channel)) for channel in channels]
+
+
+def _spacing(recording: Recording, channel: str) -> float:
+    """Usual time between readings of a channel, whole periods of the rows [s]."""
+    rate = recording.rate(channel)
+    return recording.period * (max(round(1.0 / (rate * recording.period)), 1) if rate > 0.0 else 1)
 
 
 def _density(noise: ChannelNoise, period: float) -> float:

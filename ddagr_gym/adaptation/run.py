@@ -20,7 +20,7 @@ from ddagr_gym.estimation.filter_model import SoilPrior
 from ddagr_gym.estimation.force_laws import ForceLaw
 from ddagr_gym.evaluation.adapted_controller import AdaptedSettings
 from ddagr_gym.evaluation.bundles import Bundle
-from ddagr_gym.evaluation.force_law_fits import fit_law, true_forces, turn_states
+from ddagr_gym.evaluation.force_law_fits import fit_to_soil
 from ddagr_gym.evaluation.gain_search import Outcome, SearchBox, Wanted, episodes_of, objective, search_box
 from ddagr_gym.evaluation.ladder_gains import ladder_gains, tracker_settings
 from ddagr_gym.parameters import STANDARD_GRAVITY, Robot, Soil
@@ -196,11 +196,11 @@ def refitted_prior(robot: Robot, soil: Soil, known: float) -> SoilPrior:
         robot: that was refitted.
         soil: likewise.
         known: deviations over those of all soils [-].
+
+    Raises:
+        InputError: a soil into which the robot sinks.
     """
-    states = turn_states(robot, np.random.default_rng(0))
-    forces = true_forces(robot, soil, states)
-    held = np.isfinite(forces).all(axis=1)
-    fit = fit_law(ForceLaw.coupled, states[held], forces[held], robot.outer_radius)
+    fit = fit_to_soil(ForceLaw.coupled, robot, soil)
     limit, rate, stiffness, resistance = np.exp(fit.logs).tolist()
     usual = SoilPrior()
     return SoilPrior(

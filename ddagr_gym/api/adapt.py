@@ -125,7 +125,7 @@ def adapt(
         diagnosis: folder that ``ddagr diagnose`` wrote, in place of recordings.
         calibration: folder that ``ddagr calibrate`` wrote, in place of robot and soil: alone, or with recordings that
             are compared with its ordinary drives.
-        ground: of the calibration.
+        ground: of the calibration, on which the turns are driven; may be left out where there is only one.
         controller: B4, the force balance, or B6, the path tracker.
         radius: of the turns [m].
         speed: of the turns [m/s].
@@ -249,8 +249,8 @@ def _diagnosed(
             raise InputError(f"there is no corrected simulator to tune on, {result.refit_note}: check the recordings.")
         base = Corrected(result.robot, result.soil)
     else:
-        result = diagnose(recordings, calibration=calibration, ground=ground, names_only=True, **options)
         base = corrected_by_calibration(Path(calibration), ground)
+        result = diagnose(recordings, calibration=calibration, ground=ground, names_only=True, **options)
     found = replace(
         base,
         effects=result.effects,
@@ -297,15 +297,18 @@ def _read_diagnosis(folder: Path) -> tuple[Corrected, Diagnosis]:
 
 
 def corrected_by_calibration(folder: Path, ground: str = "") -> Corrected:
-    """The simulator of a folder that ``ddagr calibrate`` wrote; InputError as :func:`load_draws`."""
+    """The simulator of a folder that ``ddagr calibrate`` wrote; InputError as :func:`load_soil`."""
     from ddagr_gym.adaptation.corrected import Corrected
+    from ddagr_gym.calibration.files import load_slope, load_soil
     from ddagr_gym.envs.calibrated_draws import EFFECTS, load_draws
     from ddagr_gym.physics.effects import load_effects
 
+    chosen, soil = load_soil(folder, ground)
     draws = load_draws(folder, ground)
     return Corrected(
         draws.robot,
-        draws.grounds[0].soil,
+        soil,
+        load_slope(folder, chosen),
         sentence=f"the calibration {folder.name}",
         calibration=folder,
         ground=ground,

@@ -177,15 +177,13 @@ def _calibrated(
     folder: Path, ground: str, robot: RobotLike | None, soil: SoilLike | None
 ) -> tuple[Robot, Path, tuple[Effect, ...], tuple[Effect, ...]]:
     """Robot, soil file, sensors and slope of a calibration; InputError where robot or soil are given besides."""
-    from ddagr_gym.calibration.files import load, load_robot, load_soil, soil_file
+    from ddagr_gym.calibration.files import load_robot, load_slope, load_soil, soil_file
     from ddagr_gym.envs.calibrated_draws import EFFECTS
     from ddagr_gym.physics.effects import load_effects
-    from ddagr_gym.physics.effects.slope import Slope
 
     check_left_out(folder, robot, soil)
     chosen, _ = load_soil(folder, ground)
-    slopes = tuple(Slope.of_gradient(*item.gradient) for item in load(folder).slopes if item.ground == chosen)
-    return load_robot(folder), folder / soil_file(chosen), load_effects(folder / EFFECTS), slopes
+    return load_robot(folder), folder / soil_file(chosen), load_effects(folder / EFFECTS), load_slope(folder, chosen)
 
 
 def driven_robot(robot: RobotLike | None, recordings: Sequence[Recording]) -> Robot:

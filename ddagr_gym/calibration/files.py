@@ -14,6 +14,7 @@ from ddagr_gym.diagnosis.result.files import finite_or_null, with_nan
 from ddagr_gym.errors import InputError
 from ddagr_gym.files import read_json, write_text
 from ddagr_gym.parameters import Robot, Soil
+from ddagr_gym.physics.effects.slope import Slope
 
 NAME = "calibration.json"
 ROBOT = "robot.yaml"
@@ -79,6 +80,11 @@ def robot_file(folder: Path) -> str:
 def load_robot(folder: Path) -> Robot:
     """Calibrated robot of a folder; InputError where it is missing or wrong."""
     return load_config(folder / ROBOT, Robot)
+
+
+def load_slope(folder: Path, ground: str) -> tuple[Slope, ...]:
+    """Slope of a calibrated ground in the frame of its poses; empty where it is level."""
+    return tuple(Slope.of_gradient(*item.gradient) for item in load(folder).slopes if item.ground == ground)
 
 
 def load_soil(folder: Path, ground: str = "") -> tuple[str, Soil]:

@@ -74,10 +74,7 @@ class _Left:
 def robot_deviations(calibration: Calibration) -> dict[str, float]:
     """By how much the calibrated parameters of the robot may be off in another drive, as the fit moves them."""
     found = {item.name: item for item in calibration.parameters if item.calibrated and not item.ground}
-    return {
-        name: float(np.hypot(item.deviation or 0.0, item.scatter.other_grounds or item.deviation or 0.0))
-        for name, item in found.items()
-    }
+    return {name: item.deviation_elsewhere for name, item in found.items()}
 
 
 def soil_deviations(calibration: Calibration) -> dict[str, dict[str, float]]:

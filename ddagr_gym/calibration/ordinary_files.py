@@ -28,7 +28,7 @@ READ = (2, 3)
 """Versions that are read: the second one also holds scans that nothing reads."""
 
 _FAULT = "is no bank of drives"
-_REMEDY = "make it with `ddagr calibrate`, without --no-bank"
+_REMEDY = "make it with `ddagr calibrate` from two drives or more, without --no-bank"
 
 DIGITS = 9
 """Of a number in the file (ours): estimates are known to a few."""

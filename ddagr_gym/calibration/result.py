@@ -6,6 +6,7 @@ measurement less prediction.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -140,6 +141,15 @@ class CalibratedParameter:
     deviation: float | None
     scatter: Scatter
     estimates: tuple[DriveEstimate, ...]
+
+    @property
+    def deviation_elsewhere(self) -> float:
+        """Deviation of a change in a further drive: what is uncertain of the mean, and what differs between drives.
+
+        Where a single drive says nothing of the latter, it counts as much as the former.
+        """
+        within, between = self.deviation or 0.0, self.scatter.other_grounds
+        return math.hypot(within, within if between is None else between)
 
 
 @dataclass(frozen=True)

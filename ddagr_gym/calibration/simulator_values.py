@@ -190,18 +190,13 @@ def calibrated_robot(data: CalibrationData, model: FittedModel, calibration: Cal
     """
     found = [i for i in calibration.parameters if i.calibrated and not i.ground and i.name not in SCALES]
     known = {p.name: quantity(data, model.model, p) for p in model.parameters if p.prior > 0.0 and p.scope is None}
-    sizes = {item.name: known[item.name].deviation(item.change, _of_another_drive(item)) for item in found}
+    sizes = {item.name: known[item.name].deviation(item.change, item.deviation_elsewhere) for item in found}
     sources = ", ".join(drive.source for drive in calibration.drives)
     return replace(
         fitted_robot(model.model.robot, model.values),
         standard_deviations={**data.robot.standard_deviations, **sizes},
         source=f"calibrated with {sources}; before: {data.robot.source}",
     )
-
-
-def _of_another_drive(item: CalibratedParameter) -> float:
-    """Deviation of a change in a further drive: what is uncertain of the mean, and what differs between drives."""
-    return math.hypot(item.deviation or 0.0, item.scatter.other_grounds or 0.0)
 
 
 def calibrated_effects(calibration: Calibration) -> tuple[Effect, ...]:
@@ -238,7 +233,7 @@ def calibrated_draws(calibration: Calibration, robot: Robot, soils: Mapping[str,
         GroundDraws(ground, soil, {i.name.partition("/")[0]: _on_another_day(i) for i in found if i.ground == ground})
         for ground, soil in soils.items()
     )
-    return CalibratedDraws(robot, {i.name: _of_another_drive(i) for i in found if not i.ground}, grounds)
+    return CalibratedDraws(robot, {i.name: i.deviation_elsewhere for i in found if not i.ground}, grounds)
 
 
 def _on_another_day(item: CalibratedParameter) -> float:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ddagr_gym.errors import InputError
+from ddagr_gym.estimation.layout import COMMANDS
 
 Array = NDArray[np.float64]
 
@@ -23,6 +24,22 @@ def sample_times(columns: Mapping[str, ArrayLike], sample_period: float) -> tupl
     if not t.size or not (durations > 0).all():
         raise InputError("columns need a time column t that increases: sort the recording and drop repeated samples.")
     return t, durations
+
+
+def known_commands(columns: Mapping[str, ArrayLike], user: str) -> Array:
+    """Commands (T, 2) for a filter that cannot go on without one.
+
+    Raises:
+        InputError: rows without a command, or columns of other lengths than ``t``.
+    """
+    commands = stack_columns(columns, COMMANDS, np.nan)
+    unknown = np.flatnonzero(~np.isfinite(commands).all(axis=1))
+    if unknown.size:
+        raise InputError(
+            f"{unknown.size} of {len(commands)} rows have no command, row {unknown[0] + 1} the first: {user} needs one "
+            "in every row; cut the recording to begin with its first command."
+        )
+    return commands
 
 
 def stack_columns(columns: Mapping[str, ArrayLike], names: tuple[str, ...], missing: float) -> Array:

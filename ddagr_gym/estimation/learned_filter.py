@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ddagr_gym.errors import InputError, unknown_name
-from ddagr_gym.estimation.columns import stack_columns
+from ddagr_gym.estimation.columns import known_commands, sample_times, stack_columns
 from ddagr_gym.estimation.filter_model import FilterModel
 from ddagr_gym.estimation.inertial_filter import InertialBatch, InertialFilter, InertialModel
-from ddagr_gym.estimation.layout import CHANNELS, COMMANDS
+from ddagr_gym.estimation.layout import CHANNELS
 from ddagr_gym.estimation.learned_inputs import (
     MEMORY_SIZE,
     Filtered,
@@ -38,6 +38,10 @@ FILE = "network.npz"
 def estimator_names() -> tuple[str, ...]:
     """Names of the estimators that come with the package."""
     return tuple(sorted(file.parent.name for file in shipped_folder("estimators").glob(f"*/{FILE}")))
+
+
+_PERIOD_TOLERANCE = 0.02
+"""Share of the period by which usual samples may come earlier or later (ours: stamps of loggers)."""
 
 
 @lru_cache(maxsize=16)
@@ -315,9 +319,14 @@ def run_learned_filter(model: LearnedModel, columns: Mapping[str, ArrayLike]) ->
     Returns:
         States after each sample (T, 15), and v_x, v_y after each block (B, 2) with their covariances (B, 2, 2); an
         incomplete last block is left out.
+
+    Raises:
+        InputError: columns missing, of different lengths, of another rate than the network's or shorter than a block,
+            or commands that are not known throughout.
     """
-    commands, readings = stack_columns(columns, COMMANDS, np.nan), stack_columns(columns, CHANNELS, np.nan)
     one, samples = LearnedFilter(model), model.network.description.samples
+    _check_samples(columns, model, samples)
+    commands, readings = known_commands(columns, "a learned filter"), stack_columns(columns, CHANNELS, np.nan)
     states, velocities, covariances = [], [], []
     for first in range(0, len(readings) - samples + 1, samples):
         block = slice(first, first + samples)
@@ -325,3 +334,19 @@ def run_learned_filter(model: LearnedModel, columns: Mapping[str, ArrayLike]) ->
         velocities.append(one.state[:2])
         covariances.append(one.covariance[:2, :2])
     return np.concatenate(states), np.array(velocities), np.array(covariances)
+
+
+def _check_samples(columns: Mapping[str, ArrayLike], model: LearnedModel, samples: int) -> None:
+    """Refuse rows that no block of the network holds; InputError."""
+    period = model.network.description.sample_period
+    t, durations = sample_times(columns, period)
+    usual = float(np.median(durations))
+    if abs(usual - period) > _PERIOD_TOLERANCE * period:
+        raise InputError(
+            f"the samples come every {usual:g} s and the network was trained for {period:g} s: import the recording at "
+            f"{1.0 / period:g} Hz."
+        )
+    if t.size < samples:
+        raise InputError(
+            f"there are {t.size} samples and a block of the network has {samples}: give a longer recording."
+        )

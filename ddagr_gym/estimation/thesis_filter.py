@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ddagr_gym.errors import InputError
-from ddagr_gym.estimation.columns import sample_times, stack_columns
+from ddagr_gym.estimation.columns import known_commands, sample_times, stack_columns
 from ddagr_gym.estimation.filter import FilterRun
 from ddagr_gym.estimation.filter_model import FilterModel
 from ddagr_gym.estimation.force_laws import ForceLaw
@@ -213,13 +213,13 @@ def run_thesis_filter(model: ThesisModel, columns: Mapping[str, ArrayLike]) -> F
         which is a result of the comparison, not an error.
 
     Raises:
-        InputError: columns missing or of different lengths.
+        InputError: columns missing or of different lengths, or commands that are not known throughout.
     """
     missing = [name for name in ("t", *COMMANDS) if name not in columns]
     if missing:
         raise InputError(f"columns lack {', '.join(missing)}: the thesis's filter needs time and commands.")
     t, durations = sample_times(columns, model.sample_period)
-    commands = stack_columns(columns, COMMANDS, np.nan)
+    commands = known_commands(columns, "the thesis's filter")
     readings = stack_columns(columns, CHANNELS, np.nan)
     states, covariances = np.empty((t.size, _SIZE)), np.empty((t.size, _SIZE, _SIZE))
     standardised = np.empty(readings.shape)

@@ -22,7 +22,7 @@ from ddagr_gym.estimation import (
     estimates,
     run_thesis_filter,
 )
-from ddagr_gym.evaluation.force_law_fits import LAUNCH, LawFit, drive_law_fit, fit_law, true_forces, turn_states
+from ddagr_gym.evaluation.force_law_fits import LAUNCH, LawFit, drive_law_fit, fit_to_soil
 from ddagr_gym.evaluation.recording_filter import FilterSetUp, filter_recording, set_up_filter
 from ddagr_gym.evaluation.thesis_runs import thesis_run
 from ddagr_gym.identification.recording_noise import recording_noise
@@ -135,10 +135,7 @@ def _expected(recording: Recording, robot: Robot, soil: Soil | None, law: ForceL
         return drive_law_fit(robot, recording.columns(), law)
     if soil is None:
         return None
-    states = turn_states(robot, np.random.default_rng(0))
-    forces = true_forces(robot, soil, states)
-    carried = np.isfinite(forces).all(axis=1)
-    return fit_law(law, states[carried], forces[carried], robot.wheels[0].outer_radius)
+    return fit_to_soil(law, robot, soil)
 
 
 def dead_reckoned(estimated: EstimatedRun) -> dict[str, Array]:

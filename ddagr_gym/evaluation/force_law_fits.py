@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from ddagr_gym.errors import InputError
 from ddagr_gym.estimation.force_laws import ForceLaw, LawParameters, wheel_law
 from ddagr_gym.jit import kernel
 from ddagr_gym.parameters import STANDARD_GRAVITY, Robot, Soil
@@ -119,3 +120,19 @@ def drive_law_fit(robot: Robot, columns: Columns, law: ForceLaw, resistance: boo
     period = float(columns["t"][1] - columns["t"][0])
     rows = np.arange(round(LAUNCH / period), len(columns["t"]), _EVERY)
     return fit_law(law, *wheel_states(robot, columns, rows), robot.wheels[0].outer_radius, resistance=resistance)
+
+
+def fit_to_soil(law: ForceLaw, robot: Robot, soil: Soil) -> LawFit:
+    """A law's parameters by the forces of a soil under the wheels of a robot in turns.
+
+    Raises:
+        InputError: a soil into which the robot sinks.
+    """
+    states = turn_states(robot, np.random.default_rng(0))
+    forces = true_forces(robot, soil, states)
+    carried = np.isfinite(forces).all(axis=1)
+    if not carried.any():
+        raise InputError(
+            f"the soil carries the {robot.name} in no turn, its wheels sink too deep: check its cohesion and moduli."
+        )
+    return fit_law(law, states[carried], forces[carried], robot.outer_radius)

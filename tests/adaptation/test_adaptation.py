@@ -181,3 +181,15 @@ def test_summary_by_hand():
     found = summary(driven, 0.33)
     assert (found["radius_error"]["value"], found["turns"]) == (0.03, 3)
     assert found["success"]["value"] == pytest.approx(2 / 3, abs=1e-4)
+
+
+def test_a_soil_that_does_not_carry_the_robot_is_refused_in_one_sentence():
+    soil = get_soil("thesis_a1")
+    mud = replace(
+        soil,
+        cohesion=0.03 * soil.cohesion,
+        cohesive_modulus=0.03 * soil.cohesive_modulus,
+        frictional_modulus=0.03 * soil.frictional_modulus,
+    )
+    with pytest.raises(InputError, match="carries the ddagr in no turn"):
+        refitted_prior(ddagr(), mud, 0.5)

@@ -73,3 +73,15 @@ def test_noise_of_the_way_is_vibration(recording):
     found = measured_sensors([replace(still, channels={**still.channels, **columns})], ddagr()).imu
     assert found.accelerometer_noise == pytest.approx(Imu().accelerometer_noise, rel=0.2)
     assert found.accelerometer_vibration == pytest.approx(0.6, rel=0.25)
+
+
+@pytest.mark.parametrize("every", [1, 2, 4])
+def test_noise_of_an_imu_that_is_slower_than_the_rows(recording, every):
+    """Of white noise, fewer readings a second mean more noise of a sample at the nominal rate."""
+    noisy = shaken(recording, 0.2, 0.0)
+    rows = np.arange(len(noisy)) % every == 0
+    channels = {name: np.where(rows, noisy[name], np.nan) for name in ("specific_force_x", "specific_force_y")}
+    found = measured_sensors([replace(noisy, channels={**noisy.channels, **channels})], ddagr()).imu
+    speed = travel_speed(recording, ddagr().outer_radius)
+    driving = found.accelerometer_noise + found.accelerometer_vibration * speed[speed > 0.02].mean()
+    assert driving == pytest.approx(0.2 * np.sqrt(every), rel=0.25)

@@ -2,19 +2,21 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
 import ddagr_gym
 from ddagr_gym import cli
 from ddagr_gym.adaptation import run
-from ddagr_gym.api.adapt import corrected_by_diagnosis
+from ddagr_gym.api.adapt import corrected_by_calibration, corrected_by_diagnosis
 from ddagr_gym.config import dump_config
 from ddagr_gym.diagnosis.answer.verdict import Diagnosis, Estimate, Finding, GatesUsed
 from ddagr_gym.diagnosis.result.files import save
 from ddagr_gym.errors import InputError, InputWarning
 from ddagr_gym.evaluation.controllers import find_controller
 from ddagr_gym.physics.effects import load_effects, save_effects
+from ddagr_gym.physics.effects.slope import Slope
 from ddagr_gym.presets import ddagr, get_soil
 
 FINDING = Finding("slope", {"angle": Estimate(0.05, "rad", (0.045, 0.055))}, 30.0, 8.0, 4.0, 20.0)
@@ -144,3 +146,27 @@ def test_the_command_writes_a_bundle_that_drives(diagnosis, few_turns, tmp_path,
     assert not list(tmp_path.glob(".adapted*"))  # nothing of the work is left
     assert find_controller(str(folder), ddagr_gym.envs.TurnSettings().turn(0.8, "left", 0.2)) is not None
     assert cli.main(words) == 2  # an earlier output is not replaced
+
+
+def test_one_of_several_grounds_is_named(monkeypatch, tmp_path):
+    """The filter's prior and the turns are of the ground that the turns are driven on."""
+    monkeypatch.setattr("ddagr_gym.calibration.files.load", lambda folder: SimpleNamespace(grounds=("sand", "yard")))
+    with pytest.raises(InputError, match="calibrated on sand, yard: name one of them with --ground"):
+        ddagr_gym.adapt(calibration=tmp_path)
+
+
+def test_turns_on_a_calibrated_ground_are_on_its_slope(monkeypatch, tmp_path):
+    slopes = (
+        SimpleNamespace(ground="yard", gradient=(0.0, 0.04)),
+        SimpleNamespace(ground="sand", gradient=(0.03, 0.0)),
+    )
+    known = SimpleNamespace(grounds=("sand", "yard"), slopes=slopes)
+    draws = SimpleNamespace(robot=ddagr())
+    monkeypatch.setattr("ddagr_gym.calibration.files.load", lambda folder: known)
+    monkeypatch.setattr("ddagr_gym.envs.calibrated_draws.load_draws", lambda folder, ground: draws)
+    (tmp_path / "soil_sand.yaml").write_text(dump_config(get_soil("thesis_a1")))
+    save_effects(tmp_path / "effects.yaml", (), source="a calibration")
+    found = corrected_by_calibration(tmp_path, "sand")
+    (slope,) = found.effects
+    assert slope == Slope.of_gradient(0.03, 0.0)
+    assert found.soil == get_soil("thesis_a1")

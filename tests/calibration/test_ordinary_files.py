@@ -71,7 +71,7 @@ def test_a_bank_without_ordinary_drives_is_refused(tmp_path):
 
 
 def test_no_bank_is_said(tmp_path):
-    with pytest.raises(InputError, match="make it with `ddagr calibrate`, without --no-bank"):
+    with pytest.raises(InputError, match="make it with `ddagr calibrate` from two drives or more, without --no-bank"):
         load_ordinary(tmp_path / "bank.json")
 
 
@@ -79,8 +79,8 @@ def test_no_bank_is_said(tmp_path):
     ("text", "said"),
     [
         ("{", "is no bank of drives"),
-        ("[]", "make it with `ddagr calibrate`, without --no-bank"),
-        ('{"ordinary": {}}', "make it with `ddagr calibrate`, without --no-bank"),
+        ("[]", "make it with `ddagr calibrate` from two drives or more, without --no-bank"),
+        ('{"ordinary": {}}', "make it with `ddagr calibrate` from two drives or more, without --no-bank"),
         ('{"version": 1, "runs": []}', "has version 1, this program reads 3: calibrate again"),
         ('{"version": 3, "ordinary": {"weighing": {}}}', "is no bank of drives"),
     ],

@@ -352,6 +352,19 @@ def test_a_recording_is_filtered_block_by_block():
     for k in range(19):
         one.run(commands[k : k + 1], readings[k])
     assert np.array_equal(velocities[-1], one.state[:2])
+    unknown = np.where(np.arange(len(samples)) == 40, np.nan, 0.3)
+    refused = (
+        (
+            columns | {"t": 0.02 * np.arange(1, len(samples) + 1)},
+            "every 0.02 s and the network was trained for 0.008 s",
+        ),
+        ({name: values[:4] for name, values in columns.items()}, "there are 4 samples and a block of the network has"),
+        (columns | {"command_left": unknown}, "1 of 197 rows have no command, row 41 the first"),
+        ({name: values for name, values in columns.items() if name != "t"}, "need a time column"),
+    )
+    for given, said in refused:
+        with pytest.raises(InputError, match=said):
+            run_learned_filter(model, given)
 
 
 def test_published_estimators_are_small_and_whole():

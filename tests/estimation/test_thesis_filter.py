@@ -102,6 +102,10 @@ def test_missing_samples(robot, recording):
     [
         (lambda r, d: run_thesis_filter(ThesisModel(r), {"t": d["t"]}), "needs time and commands"),
         (lambda r, d: run_thesis_filter(ThesisModel(r), d | {"yaw_rate": [0.0]}), "one length"),
+        (
+            lambda r, d: run_thesis_filter(ThesisModel(r), d | {"command_left": np.where(d["t"] < 0.02, np.nan, 1.0)}),
+            "rows have no command, row 1 the first: the thesis's filter needs one in every row; cut the recording",
+        ),
         (lambda r, d: ThesisModel(r, process=(1.0,)), "give 8 variances"),
         (lambda r, d: ThesisModel(r, stability=0.0), "stability is 0"),
     ],

@@ -30,6 +30,7 @@ from ddagr_gym.recordings.schema import Recording
 Array = NDArray[np.float64]
 
 NEWER = "the calibration is older than this effect: calibrate again"
+APART = "it needs ordinary drives whose poses are in one frame, and theirs begin anew from stretch to stretch"
 
 OF_ANOTHER_GROUND = "on another ground it is another one in any case"
 SOIL_EFFECTS = ("soil_change", "soil_split", "slip_sinkage", "multipass", "lateral_bulldozing")
@@ -217,7 +218,7 @@ class OrdinaryRobot:
 
     def comparison(self, ground: str) -> Comparison:
         """What drives on a ground that is known or ("") not are compared with."""
-        moved, new = tuple(item.moved for item in self.references), dict.fromkeys(self._unscanned, NEWER)
+        moved, new = tuple(item.moved for item in self.references), self._unscanned
         if ground:
             drives, pieces = ([item.known_ground for item in found] for found in (self.references, self.pieces))
             # of calibrations' drives, on several grounds, it is not known how far channels differ between grounds
@@ -229,10 +230,11 @@ class OrdinaryRobot:
         return Comparison(tuple(drives), tuple(pieces), self.other_scatter, unnamed, moved)
 
     @property
-    def _unscanned(self) -> list[str]:
-        """Effects that came into the library after the ordinary drives were scanned."""
+    def _unscanned(self) -> dict[str, str]:
+        """Effects for which no ordinary drive was scanned, and why."""
         scanned = {key.rpartition(" ")[0] for item in self.references for key in item.known_ground.keys}
-        return [name for name in effect_kinds() if name not in scanned]
+        absent = {name: kind for name, kind in effect_kinds().items() if name not in scanned}
+        return {name: APART if kind.needs_one_frame else NEWER for name, kind in absent.items()}
 
     def without(self, drive: str) -> OrdinaryRobot:
         """The same from the other drives alone: robot and soil as calibrated without one, whose scan is left out.

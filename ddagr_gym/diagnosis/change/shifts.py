@@ -140,6 +140,8 @@ def sizes_of(scores: Scores, keys: Sequence[str], ridge: Array, beside: Sequence
         ridge: (k,) information on their multiples before any data.
         beside: keys of columns that are estimated with them.
     """
+    if not scanned(scores, keys):
+        return None
     known = shown(scores, beside)
     rows = [scores.keys.index(key) for key in (*keys, *known)]
     inner = scores.information[np.ix_(rows, rows)]
@@ -162,7 +164,14 @@ def sizes_of(scores: Scores, keys: Sequence[str], ridge: Array, beside: Sequence
 
 def shown(scores: Scores, keys: Sequence[str]) -> tuple[str, ...]:
     """Those of some columns of which a drive shows anything: a limit that it does not reach has none."""
-    return tuple(key for key in keys if scores.information[(scores.keys.index(key),) * 2] > NOTHING)
+    return tuple(
+        key for key in keys if scanned(scores, [key]) and scores.information[(scores.keys.index(key),) * 2] > NOTHING
+    )
+
+
+def scanned(scores: Scores, keys: Sequence[str]) -> bool:
+    """Whether a drive was asked for some columns: one whose poses are in frames of their own is not for places."""
+    return set(keys) <= set(scores.keys)
 
 
 def explained(scores: Scores, keys: Sequence[str], ridge: Array, beside: Sequence[str] = ()) -> float:

@@ -116,7 +116,7 @@ class Weighing:
     @property
     def _accelerometers_on_one_ground(self) -> float:
         """Deviation of the accelerometers' biases between drives on one ground, drawn towards what is expected."""
-        grounds = {item.ground for item in self.biases}
+        grounds = dict.fromkeys(item.ground for item in self.biases)
         groups = [np.array([item.value[1:] for item in self.biases if item.ground == ground]) for ground in grounds]
         square = sum(float(((group - group.mean(axis=0)) ** 2).sum()) for group in groups)
         degrees = sum(2.0 * (len(group) - 1) for group in groups)

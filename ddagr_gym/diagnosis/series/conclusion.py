@@ -183,7 +183,10 @@ def _moved_size(event: Event, j: int, point: SizePoint) -> MovedSize:
 
 def _usual(event: Event, sizes: Sizes) -> Array:
     """(q,) shifts that a single ordinary drive exceeds in any size in 5 % of the cases."""
-    own = np.median(sizes.deviations[event.place.first : event.place.end], axis=0)
+    seen = slice(event.place.first, event.place.end)
+    known = np.isfinite(sizes.values[seen])
+    columns = zip(sizes.deviations[seen].T, known.T, strict=True)
+    own = np.array([np.median(deviations[told]) if told.any() else np.inf for deviations, told in columns])
     level = single_level(sizes.values.shape[1])
     quantile = np.array([distance_at(level, 1, float(degrees)) for degrees in sizes.degrees])
     return np.asarray(quantile * np.hypot(own, sizes.mean_deviations))

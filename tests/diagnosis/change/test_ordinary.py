@@ -133,3 +133,4 @@ def test_effects_that_came_after_a_calibration_are_not_compared(robot):
     unnamed = replace(robot, references=references).comparison("sand").unnamed
     assert set(effect_kinds()) - set(unnamed) == {"gyro_bias", "slope"}
     assert "calibrate again" in unnamed["command_gain"]
+    assert "poses are in one frame" in unnamed["soil_patch"]

@@ -242,3 +242,13 @@ def test_a_drive_that_shows_nothing_of_an_effect_explains_nothing_by_it():
     assert explained(blind, SIGN.keys, SIGN.ridge) == 0.0
     seeing = scores(SIGN.keys[0], 2.0, 0.5)
     assert explained(seeing, SIGN.keys, np.zeros(1)) == pytest.approx(0.5 * (2.0 / 0.5) ** 2)
+
+
+def test_an_ordinary_drive_that_was_not_asked_for_an_effect_says_nothing_of_it():
+    """Poses in frames of their own leave slopes and places out of a drive's scan."""
+    other = scores("payload 0", 1.0, 0.5)
+    assert sizes_of(other, BIAS.keys, BIAS.ridge) is None
+    assert explained(other, BIAS.keys, BIAS.ridge) == 0.0
+    drive = scores(BIAS.keys[0], 3.0, 0.5)
+    mixed, alone = (shift_of(BIAS, drive, against(*drives)) for drives in ((*ALIKE.drives, other), ALIKE.drives))
+    assert mixed.distance == alone.distance

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from ddagr_gym.diagnosis.answer.drive_series import BY_NAME, BY_TIME, PASSES, SINGLE, STAYS
-from ddagr_gym.diagnosis.series.conclusion import conclude_series, drive_row, in_order, natural
+from ddagr_gym.diagnosis.series.change_points import Sizes
+from ddagr_gym.diagnosis.series.conclusion import _is_small, conclude_series, drive_row, in_order, natural
 from ddagr_gym.diagnosis.series.files import load, save
 from ddagr_gym.errors import InputError
 from ddagr_gym.reporting.drive_series_page import write_page
@@ -136,3 +137,16 @@ def test_a_page_of_nothing_but_refused_drives(tmp_path):
     pytest.importorskip("jinja2", reason="needs the extra report")
     write_page(tmp_path, series([None, None]))
     assert "None of the 2 drives could be compared." in (tmp_path / "index.html").read_text()
+
+
+def test_drives_that_do_not_show_a_size_do_not_widen_what_is_usual():
+    """A size that three drives in four do not have keeps its own scale, here a hundredth of the others'."""
+    values = np.full((8, 1), np.nan)
+    values[[0, 4]] = 0.3
+    deviations = np.where(np.isfinite(values), 0.01, 1.0)
+    sizes = Sizes(values, deviations, np.array([0.005]), np.array([9.0]))
+    event = SimpleNamespace(
+        place=SimpleNamespace(first=0, end=8), shifts=np.array([0.3]), probabilities=np.array([1e-9])
+    )
+    assert not _is_small(event, sizes)
+    assert _is_small(SimpleNamespace(**{**vars(event), "shifts": np.array([0.01])}), sizes)
