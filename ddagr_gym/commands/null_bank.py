@@ -166,7 +166,8 @@ def _check_options(arguments: Arguments) -> None:
     from ddagr_gym.diagnosis.null_bank.drives import DRIVES
     from ddagr_gym.diagnosis.setting import LEAST_WINDOWS, SHORT, SHORTEST
 
-    shared = 0.0 if arguments.ordinary else LEAST_WINDOWS * arguments.window / DRIVES
+    copied = arguments.runs and not arguments.ordinary
+    shared = LEAST_WINDOWS * arguments.window / DRIVES if copied else 0.0
     for name, least in (("window", SHORTEST), ("stride", 0.1), ("piece", max(LEAST_WINDOWS * SHORT, shared))):
         given = getattr(arguments, name)
         if given is not None and not least <= given < math.inf:

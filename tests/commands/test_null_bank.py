@@ -92,6 +92,15 @@ def test_thresholds_know_their_windows(quick_nulls: list[int], tmp_path: Path) -
     assert load_thresholds(tmp_path / "thresholds.json").duration == 4.0
 
 
+def test_three_pieces_must_hold_the_windows_of_a_run(
+    quick_nulls: list[int], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = save_drive(tmp_path / "run.parquet", 400.0)
+    assert main([*words(tmp_path), run, "--piece", "20", "--window", "9"]) == 2
+    assert "--piece is 20: give a finite time of at least 24 s" in capsys.readouterr().err
+    assert main([*words(tmp_path), "--piece", "20", "--window", "9"]) == 0
+
+
 def test_windows_that_were_cut_shorter_are_those_that_are_kept(
     quick_nulls: list[int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
