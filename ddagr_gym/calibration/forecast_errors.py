@@ -13,8 +13,9 @@ from ddagr_gym.calibration.calibration_data import CalibrationData
 from ddagr_gym.calibration.joint_fit import FittedModel
 from ddagr_gym.calibration.left_out import ENCODERS, Forecast, fold_name, folds
 from ddagr_gym.calibration.result import CALIBRATED, DATA_SHEET, KINEMATIC, ForecastError
-from ddagr_gym.calibration.simulator_values import fitted_factors, fitted_robot, fitted_soil
+from ddagr_gym.calibration.simulator_values import fitted_factors, fitted_soil
 from ddagr_gym.identification.fit_numerics import field_numerics
+from ddagr_gym.identification.fitted_values import robot_with_values
 from ddagr_gym.identification.motor_currents import without_currents
 from ddagr_gym.identification.residual_weights import ROBUST
 from ddagr_gym.identification.side_by_side import side_by_side
@@ -97,7 +98,7 @@ def all_forecasts(
         values = forecast.values_of(model)
         return Forecasts(
             fold_name(data, forecast.fold), ground, soil_from, windows, predictions,
-            fitted_robot(model.model.robot, values), fitted_soil(data, ground, values), fitted_factors(values),
+            robot_with_values(model.model.robot, values), fitted_soil(data, ground, values), fitted_factors(values),
             None if data.currents is None else _currents(forecast),
         )  # fmt: skip
 

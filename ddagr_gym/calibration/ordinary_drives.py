@@ -20,13 +20,14 @@ from ddagr_gym.calibration.left_out import Forecast
 from ddagr_gym.calibration.result import Calibration
 from ddagr_gym.calibration.robots_on_grounds import GroundModel, ground_model
 from ddagr_gym.calibration.settings import HISTORY
-from ddagr_gym.calibration.simulator_values import SOIL_PARAMETERS, fitted_robot, fitted_soil
+from ddagr_gym.calibration.simulator_values import SOIL_PARAMETERS, fitted_soil
 from ddagr_gym.diagnosis.change.drive_fit import change_problem, change_windows, fit_nominal, misfit_of_compared
 from ddagr_gym.diagnosis.change.ground_slope import deviations_of, effects_of
 from ddagr_gym.diagnosis.change.ordinary import Reference, field_deviations, uncertain_parameters
 from ddagr_gym.diagnosis.change.reference import OrdinaryDrive, scan_ordinary
 from ddagr_gym.diagnosis.change.robot_on_ground import RobotOnGround, uncertain_robot
 from ddagr_gym.diagnosis.change.weighing import UNKNOWN_ACCELEROMETER_BIAS, SensorBias, Weighing
+from ddagr_gym.identification.fitted_values import robot_with_values
 from ddagr_gym.identification.recording_noise import RecordingNoise
 from ddagr_gym.identification.relative_readings import usual_turning
 from ddagr_gym.identification.residual_weights import UNKNOWN_GYRO_BIAS, noise_weights
@@ -167,7 +168,7 @@ class _Drives:
         number = int(forecast.windows.recording[0])
         data, ground = self.data, self.data.grounds[number]
         values = forecast.values_of(self.model)
-        own = replace(fitted_robot(self.model.model.robot, values), standard_deviations=robot.standard_deviations)
+        own = replace(robot_with_values(self.model.model.robot, values), standard_deviations=robot.standard_deviations)
         recordings = data.prepared.recordings
         maps = {recording.meta.column_map for k, recording in enumerate(recordings) if k != number}
         beside = [drive for drive in data.drives_on[ground] if drive != number]

@@ -1,4 +1,4 @@
-"""Fitted values as numbers of a robot and of soils: the one place where a logarithm becomes a number with a unit."""
+"""What a calibration found, in numbers with units, as robots, soils, effects and draws of a simulator."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ddagr_gym.calibration.joint_fit import FittedModel
 from ddagr_gym.calibration.parts import SCALES, RobotModel, factors_of_banks, is_stated, part_of
 from ddagr_gym.calibration.result import CalibratedParameter, Calibration
 from ddagr_gym.envs.calibrated_draws import CalibratedDraws, GroundDraws
-from ddagr_gym.identification.fitted_values import soil_with_values, with_values
+from ddagr_gym.identification.fitted_values import robot_with_values, soil_with_values
 from ddagr_gym.identification.parameters import LIMITS, ModelParameter
 from ddagr_gym.parameters import Drivetrain, Robot, Soil
 from ddagr_gym.physics.effects import Effect
@@ -22,16 +22,12 @@ from ddagr_gym.physics.effects.gyro_scale import GyroScale
 from ddagr_gym.physics.effects.imu_lever_arm import ImuLeverArm
 from ddagr_gym.physics.effects.imu_misalignment import ImuMisalignment
 from ddagr_gym.physics.effects.imu_tilt import ImuTilt
-from ddagr_gym.presets import firm_ground
 
 SOIL_PARAMETERS = ("soil_strength", "soil_stiffness", "shear_modulus", "exit_angle_ratio")
 """Parameters that a ground has of its own; the first two are factors on two entries of a soil each."""
 
 SOIL = "soil"
 """Stands for a part of the robot with the parameters of a soil."""
-
-_ANY_SOIL = firm_ground()
-"""Goes through a function that changes a robot and a soil together, and is not used."""
 
 SOIL_HELPS = "turns on the spot and hard accelerations on this ground"
 """Drive that determines what a soil keeps."""
@@ -143,27 +139,6 @@ def _soil_scale(soil: Soil, name: str) -> tuple[float, float]:
     return soil.shear_modulus, soil.shear_modulus
 
 
-def fitted_robot(robot: Robot, values: Mapping[str, float]) -> Robot:
-    """Robot at values of the fit.
-
-    Args:
-        robot: that the values change.
-        values: by name of the parameters; what belongs to soils and sensors is left out.
-    """
-    changed, _ = with_values(robot, _ANY_SOIL, values)
-    drivetrain = {
-        item.name: _after(robot, item.name, values[item.name])
-        for item in fields(robot.drivetrain)
-        if values.get(item.name, 0.0) != 0.0
-    }
-    return replace(changed, drivetrain=replace(robot.drivetrain, **drivetrain))
-
-
-def _after(robot: Robot, name: str, change: float) -> float:
-    nominal, scale = _robot_scale(robot, name)
-    return nominal + change if scale == 0.0 else nominal * math.exp(change)
-
-
 def fitted_soil(data: CalibrationData, ground: str, values: Mapping[str, float]) -> Soil:
     """Nominal soil of a ground at values of the fit."""
     own = {base: values.get(f"{base}_{ground}", 0.0) for base in SOIL_PARAMETERS}
@@ -193,7 +168,7 @@ def calibrated_robot(data: CalibrationData, model: FittedModel, calibration: Cal
     sizes = {item.name: known[item.name].deviation(item.change, item.deviation_elsewhere) for item in found}
     sources = ", ".join(drive.source for drive in calibration.drives)
     return replace(
-        fitted_robot(model.model.robot, model.values),
+        robot_with_values(model.model.robot, model.values),
         standard_deviations={**data.robot.standard_deviations, **sizes},
         source=f"calibrated with {sources}; before: {data.robot.source}",
     )

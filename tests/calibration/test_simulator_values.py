@@ -7,7 +7,7 @@ import math
 import pytest
 
 from ddagr_gym.calibration.parts import complete_robot
-from ddagr_gym.calibration.simulator_values import fitted_robot
+from ddagr_gym.identification.fitted_values import robot_with_values
 from ddagr_gym.identification.parameters import robot_parameters
 from ddagr_gym.identification.window_model import ideal_sensors
 from ddagr_gym.presets import get_robot, get_soil
@@ -28,13 +28,15 @@ def test_the_robot_has_the_row_that_the_fit_simulated():
     row = build_row(robot, soil, ideal_sensors(0.05))[None].copy()
     for parameter in robot_parameters(robot):
         parameter.apply(row, CHANGES.get(parameter.name, 0.0), np.zeros(1, dtype=np.int64))
-    np.testing.assert_allclose(build_row(fitted_robot(robot, CHANGES), soil, ideal_sensors(0.05)), row[0], rtol=1e-12)
+    np.testing.assert_allclose(
+        build_row(robot_with_values(robot, CHANGES), soil, ideal_sensors(0.05)), row[0], rtol=1e-12
+    )
 
 
 def test_numbers_are_those_that_a_reader_expects():
     robot = complete_robot(get_robot("warthog"))
-    found = fitted_robot(robot, CHANGES)
+    found = robot_with_values(robot, CHANGES)
     assert found.drivetrain.command_delay == pytest.approx(0.3)
     assert found.drivetrain.power_limit == pytest.approx(robot.drivetrain.power_limit * math.exp(0.4))
     assert found.motor_rate == pytest.approx(6.0 * math.exp(-0.2))
-    assert fitted_robot(robot, {}) == robot
+    assert robot_with_values(robot, {}) == robot
