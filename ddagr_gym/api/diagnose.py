@@ -288,7 +288,8 @@ def _gates(given: ThresholdsLike | None, nominal: Nominal, soil_uncertainty: flo
     from ddagr_gym.diagnosis.gates.threshold_files import usual_thresholds
 
     usual = usual_thresholds(nominal.robot.name)
-    return thresholds_from(given or usual, nominal.robot, nominal.soil_name, soil_uncertainty) or usual
+    wanted = usual if given is None else given
+    return thresholds_from(wanted, nominal.robot, nominal.soil_name, soil_uncertainty) or usual
 
 
 def _window(window: float | None, gates: Thresholds) -> float:

@@ -13,8 +13,9 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from ddagr_gym.recordings.checks.blocks import FEWEST_BLOCKS, cut_blocks, interval_of, resample
+from ddagr_gym.recordings.checks.blocks import FEWEST_BLOCKS, interval_of, resample
 from ddagr_gym.recordings.checks.findings import CheckFinding, Interval, judge, not_testable
+from ddagr_gym.recordings.checks.regression import blocks_in_spans
 from ddagr_gym.recordings.checks.signals import filled, integral, new_rows, wrap
 from ddagr_gym.recordings.checks.silences import heard_spans
 from ddagr_gym.recordings.schema import BoolArray, FloatArray, Recording
@@ -221,11 +222,9 @@ def _lag_sums(
         samples: y, NaN where there is no new sample.
         within: only samples in rows where this is finite, None for all.
     """
-    spans = list(heard_spans(recording))
     sums, times = [], []
     usable = np.isfinite(samples) & (True if within is None else np.isfinite(within))
-    for block in cut_blocks(recording):
-        span = next(s for s in spans if s.start <= block.start < s.stop)
+    for span, block in blocks_in_spans(recording):
         rows = block.start + np.flatnonzero(usable[block])
         x = reference(span, recording.t[rows][None, :] - LAGS[:, None])
         known = np.all(np.isfinite(x), axis=0)
