@@ -6,9 +6,9 @@ the yaw rate r and its change a of the calibrated simulator, driven by the comma
     R(yaw) [f_x - a y - r^2 x, f_y + a x - r^2 y] + b_d                                                             (1)
 
 (theory: wheel model, eq. (35)) is fitted to the readings of the drives d, as means over a quarter of a second and with
-a robust loss: the yaw of the sensor, its place (x, y), and what it reads too much in each drive, b_d. What all b_d have
-in common is gravity along the axes of a tilted sensor. As of any part, left-out drives decide whether yaw and place are
-kept; each must also be large enough to matter.
+a robust loss: the yaw of the sensor, its place (x, y), and what it reads too much in each drive, b_d. What the b_d of
+several drives have in common is gravity along the axes of a tilted sensor; in one drive, bias and slope read the same.
+As of any part, left-out drives decide whether yaw and place are kept; each must also be large enough to matter.
 """
 
 from __future__ import annotations
@@ -104,7 +104,7 @@ def imu_mounting(data: CalibrationData, model: FittedModel) -> ImuMounting | Non
     groups = np.unique(readings.group)
     if groups.size < 2:
         return None
-    return mounting_from(readings)
+    return mounting_from(readings, data.count)
 
 
 def readings_of(data: CalibrationData, model: FittedModel) -> Readings:
@@ -130,11 +130,12 @@ def _means(values: Array, length: int) -> Array:
     return np.asarray(values[:, : blocks * length].reshape(windows, blocks, length, count).mean(axis=2))
 
 
-def mounting_from(readings: Readings) -> ImuMounting:
+def mounting_from(readings: Readings, drives: int) -> ImuMounting:
     """Mounting from readings of two groups or more.
 
     Args:
         readings: of drives, or of the quarters of one.
+        drives: how many there are; a single one does not tell a tilt.
     """
     groups = np.unique(readings.group)
 
@@ -155,7 +156,7 @@ def mounting_from(readings: Readings) -> ImuMounting:
     whole = without(None, kept)
     left_out = [without(group, kept) for group in groups.tolist()]
     sizes = [_size(name, whole, left_out, kept, decided) for name in SIZES]
-    tilts = [_tilt(name, whole, groups) for name in TILTS]
+    tilts = [_tilt(name, whole, groups) if drives > 1 else _untold(name) for name in TILTS]
     before = without(None, frozenset())
     return ImuMounting((*sizes, *tilts), len(readings.group), before.left, whole.left)
 
@@ -271,4 +272,9 @@ def _tilt(name: str, whole: _Fit, groups: Integers) -> MountingSize:
     interval = (value - half, value + half)
     if kept:
         return MountingSize(name, "rad", value, interval, True, None, None, "")
+    return _untold(name)
+
+
+def _untold(name: str) -> MountingSize:
+    """A tilt that the drives do not tell."""
     return MountingSize(name, "rad", 0.0, None, False, None, None, HELPS["imu_tilt"])

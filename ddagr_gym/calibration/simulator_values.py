@@ -196,7 +196,7 @@ def mounting_effects(found: ImuMounting | None) -> tuple[Effect, ...]:
 
 
 def calibrated_draws(calibration: Calibration, robot: Robot, soils: Mapping[str, Soil]) -> CalibratedDraws:
-    """Robots and soils as they differ between drives, for episodes to draw from.
+    """Robots, soils and slopes as they differ between drives, for episodes to draw from.
 
     Args:
         calibration: with the scatter.
@@ -204,8 +204,14 @@ def calibrated_draws(calibration: Calibration, robot: Robot, soils: Mapping[str,
         soils: calibrated, by ground.
     """
     found = [item for item in calibration.parameters if item.calibrated and item.name not in SCALES]
+    slopes = {item.ground: (item.gradient, item.deviations) for item in calibration.slopes}
     grounds = tuple(
-        GroundDraws(ground, soil, {i.name.partition("/")[0]: _on_another_day(i) for i in found if i.ground == ground})
+        GroundDraws(
+            ground,
+            soil,
+            {i.name.partition("/")[0]: _on_another_day(i) for i in found if i.ground == ground},
+            *slopes.get(ground, ()),
+        )
         for ground, soil in soils.items()
     )
     return CalibratedDraws(robot, {i.name: i.deviation_elsewhere for i in found if not i.ground}, grounds)

@@ -1,4 +1,4 @@
-"""Robots and soils as a calibration found them, drawn anew for each episode from the scatter between its drives."""
+"""Robots and grounds as a calibration found them, drawn anew for each episode from the scatter between its drives."""
 
 from __future__ import annotations
 
@@ -36,18 +36,38 @@ _ADDED = (
 
 @dataclass(frozen=True)
 class GroundDraws:
-    """Soils of one ground.
+    """Soils and slopes of one ground.
 
     Attributes:
         name: of the ground.
         soil: calibrated.
         spread: deviations between drives on it: soil_strength, soil_stiffness and shear_modulus of logarithms,
             exit_angle_ratio of the ratio.
+        gradient: rise per metre along the axes of the calibration's poses [-]; none where nothing surely slopes.
+        gradient_deviations: of that of another drive on it [-].
     """
 
     name: str
     soil: Soil
     spread: Mapping[str, float]
+    gradient: tuple[float, float] = (0.0, 0.0)
+    gradient_deviations: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def slopes(self) -> bool:
+        """Whether drives said so."""
+        return any(self.gradient)
+
+    def draw_gradient(self, rng: np.random.Generator) -> tuple[float, float]:
+        """Rise per metre along the rows and across [-]; nothing is drawn on level ground.
+
+        Rows may lie in any direction of the axes in which the gradient is known.
+        """
+        if not self.slopes:
+            return 0.0, 0.0
+        drawn = [g + d * _cut(rng) for g, d in zip(self.gradient, self.gradient_deviations, strict=True)]
+        steepness, direction = math.hypot(*drawn), float(rng.uniform(-math.pi, math.pi))
+        return steepness * math.cos(direction), steepness * math.sin(direction)
 
     def draw(self, rng: np.random.Generator) -> Soil:
         """A soil of this ground."""
@@ -110,9 +130,18 @@ class CalibratedDraws:
         )
         return replace(self.robot, wheels=wheels, drivetrain=drivetrain, **factors)
 
+    @property
+    def slopes(self) -> bool:
+        """Whether one of the grounds does."""
+        return any(ground.slopes for ground in self.grounds)
+
+    def draw_ground(self, rng: np.random.Generator) -> GroundDraws:
+        """One of the grounds."""
+        return self.grounds[int(rng.integers(len(self.grounds)))]
+
     def draw_soil(self, rng: np.random.Generator) -> Soil:
         """A soil of one of the grounds."""
-        return self.grounds[int(rng.integers(len(self.grounds)))].draw(rng)
+        return self.draw_ground(rng).draw(rng)
 
 
 def _cut(rng: np.random.Generator) -> float:

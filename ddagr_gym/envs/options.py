@@ -90,7 +90,8 @@ def make_settings(
 
     With a ``calibration``, the folder that ``ddagr calibrate`` wrote, every episode draws a robot and a soil of one of
     its grounds (or of ``ground``) from the scatter between its drives. They stand in place of ``robot``, ``soil`` and
-    the default randomisation's spread of mass, inertia, motor rate and delay; its sensors' effects are added.
+    the default randomisation's spread of mass, inertia, motor rate and delay; its sensors' effects are added. A ground
+    that sloped slopes as steeply, and the rows lie in any direction on it; ``filter="inertial"`` knows slopes.
 
     Every object may be given by its fields, and (low, high) as a list, so that an environment can be made again from
     JSON. Effects need their names: as texts, as a file or as the entries of one.

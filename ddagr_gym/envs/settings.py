@@ -8,11 +8,12 @@ from dataclasses import dataclass, field, fields, replace
 import numpy as np
 
 from ddagr_gym.control.row_turn import SIDES, RowTurn
-from ddagr_gym.envs.calibrated_draws import CalibratedDraws
+from ddagr_gym.envs.calibrated_draws import CalibratedDraws, GroundDraws
 from ddagr_gym.envs.ekf_features import check_filter
 from ddagr_gym.errors import InputError, unknown_name
 from ddagr_gym.parameters import Imu, Numerics, Robot, Sensors, Soil
 from ddagr_gym.physics.effects import Effect
+from ddagr_gym.physics.effects.slope import Slope
 from ddagr_gym.physics.soil_draws import SoilDistribution, draw_soil, get_distribution, soil_field
 from ddagr_gym.physics.terrain import SoilField
 from ddagr_gym.presets import ddagr
@@ -120,7 +121,7 @@ class TurnSettings(Validated):
         ekf_features: append the filter's estimates to the observation.
         filter: makes the features: "flat" takes the ground for level, "inertial" knows slopes, "learned" is that with
             its velocities corrected by a trained network.
-        calibrated: robots and soils of a calibration, drawn instead of ``robot`` and ``soil``.
+        calibrated: robots and grounds of a calibration, drawn instead of ``robot`` and ``soil``.
         path_features: append the inertial filter's pose and its errors on the commanded path as well.
     """
 
@@ -168,7 +169,8 @@ class TurnSettings(Validated):
         side = ("left", "right")[int(rng.integers(2))] if self.side == "random" else self.side
         radius = _drawn(self.radius, rng)
         robot = self._draw_robot(rng)
-        soil, rejected = self._draw_soil(rng, robot)
+        ground = None if self.calibrated is None else self.calibrated.draw_ground(rng)
+        soil, rejected = self._draw_soil(rng, robot) if ground is None else (ground.draw(rng), 0)
         turn = self.turn(radius, side, _drawn(self.speed, rng))
         return Episode(
             turn=turn,
@@ -180,18 +182,26 @@ class TurnSettings(Validated):
             heading_offset=float(spread.heading_offset * rng.standard_normal()),
             field=self._draw_field(soil, turn, rng),
             rejected_soils=rejected,
-            slope=self._draw_slope(rng),
+            slope=self._draw_slope(rng, ground),
         )
 
-    def _draw_slope(self, rng: np.random.Generator) -> tuple[float, float]:
+    @property
+    def sloping(self) -> bool:
+        """Whether the ground of episodes may slope."""
+        return self.randomisation.slope > 0.0 or (self.calibrated is not None and self.calibrated.slopes)
+
+    def _draw_slope(self, rng: np.random.Generator, ground: GroundDraws | None) -> tuple[float, float]:
         """Inclination and direction of steepest ascent [rad]; nothing is drawn where all ground is level."""
         most = self.randomisation.slope
-        return (float(rng.uniform(0.0, most)), float(rng.uniform(-math.pi, math.pi))) if most else (0.0, 0.0)
+        drawn = (float(rng.uniform(0.0, most)), float(rng.uniform(-math.pi, math.pi))) if most else (0.0, 0.0)
+        if ground is None or not ground.slopes:
+            return drawn
+        x, y = np.add(ground.draw_gradient(rng), Slope(*drawn).gradient).tolist()
+        sum_of_both = Slope.of_gradient(x, y)
+        return sum_of_both.angle, sum_of_both.direction
 
     def _draw_soil(self, rng: np.random.Generator, robot: Robot) -> tuple[Soil, int]:
         """Soil of an episode, and how many draws before it were rejected."""
-        if self.calibrated is not None:
-            return self.calibrated.draw_soil(rng), 0
         return (self.soil, 0) if isinstance(self.soil, Soil) else draw_soil(self.soil, rng, robot)
 
     def _draw_robot(self, rng: np.random.Generator) -> Robot:

@@ -53,7 +53,7 @@ class TurnBatch:
     def __init__(self, settings: TurnSettings, count: int = 1, threads: int = 1, recorded: Sequence[int] = ()) -> None:
         self.settings = settings
         self.count = count
-        self._sloping = settings.randomisation.slope > 0.0
+        self._sloping = settings.sloping
         drawn: tuple[Effect, ...] = (CommandDelay(0.0), Slope(0.0)) if self._sloping else (CommandDelay(0.0),)
         self.simulator = Simulator(
             count, numerics=settings.numerics, effects=(*drawn, *settings.effects), threads=threads

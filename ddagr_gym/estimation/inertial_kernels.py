@@ -23,6 +23,7 @@ from ddagr_gym.estimation.inertial_layout import (
     BALANCE,
     BALANCE_INTERVAL,
     BALANCE_LEARNING,
+    FIRST_DURATION,
     GRAVITY,
     GRAVITY_WALK,
     INERTIAL_STATE_SIZE,
@@ -42,6 +43,7 @@ from ddagr_gym.estimation.inertial_layout import (
     POSE_SIZE,
     PULL_KNOWN,
     SUMMED,
+    UNEVEN_DURATION,
     UNKNOWN_ACCELERATION,
     Q,
 )
@@ -280,6 +282,23 @@ def correct_inertial(model: Array, work: Array, standing: bool) -> None:
             use_innovation(model, work, -work[X + axis], entry_column(work, axis), model[STANDSTILL_VARIANCE + axis])
 
 
+@kernel(inline=True)
+def since_balance(work: Array, place: int, interval: int, duration: float) -> float:
+    """Time since the last balance [s]; of even samples to the bit so many times their duration.
+
+    Args:
+        work: workspace, updated.
+        place: of the sample since the last balance, from 1.
+        interval: samples from balance to balance.
+        duration: of the sample [s].
+    """
+    if place == 1:
+        work[FIRST_DURATION] = duration
+        work[UNEVEN_DURATION] = 0.0
+    work[UNEVEN_DURATION] += duration - work[FIRST_DURATION]
+    return interval * work[FIRST_DURATION] + work[UNEVEN_DURATION]
+
+
 @kernel()
 def inertial_sample(
     model: Array, work: Array, command: Array, reading: Array, number: int, duration: float, standardised: Array
@@ -300,13 +319,14 @@ def inertial_sample(
     predict_inertial(model, work, command[0], command[1], duration)
     correct_inertial(model, work, at_rest(model, work, command[0], command[1]))
     interval = int(model[BALANCE_INTERVAL])
+    since = since_balance(work, 1 + (number - 1) % interval, interval, duration)
     if number % interval == 0:
         speed = rim_advance(model, work)
         known = _pull_known(model, work)
         if abs(speed) < model[LAUNCH_SPEED]:
             _roll(model, work, speed)
         else:
-            balance_forces(model, work, interval * duration)
+            balance_forces(model, work, since)
             if not known:
                 _hold_slip(model, work, speed)
     _limit(model, work)

@@ -108,7 +108,8 @@ def load_corrected(
 def _of_calibration(folder: Path, ground: str) -> Corrected:
     chosen, soil = calibration_files.load_soil(folder, ground)
     draws = load_draws(folder, chosen)
-    effects = load_effects(folder / EFFECTS) if (folder / EFFECTS).is_file() else ()
+    sensors = load_effects(folder / EFFECTS) if (folder / EFFECTS).is_file() else ()
+    effects = (*sensors, *calibration_files.load_slope(folder, chosen))
     found = Simulated(calibration_files.load_robot(folder), soil, effects)
 
     def draw(rng: np.random.Generator) -> Simulated:

@@ -56,7 +56,7 @@ def sizes(found):
 
 def test_what_effects_of_the_library_do_is_found():
     truth = (ImuLeverArm(0.6, -0.3), ImuMisalignment(0.2))
-    found = mounting_from(readings(truth))
+    found = mounting_from(readings(truth), 4)
     named = sizes(found)
     for name, true in {"imu_x": 0.6, "imu_y": -0.3, "imu_yaw": 0.2}.items():
         item = named[name]
@@ -71,7 +71,7 @@ def test_what_effects_of_the_library_do_is_found():
 
 
 def test_an_imu_that_is_mounted_as_stated_stays_so():
-    found = mounting_from(readings())
+    found = mounting_from(readings(), 4)
     assert not any(item.kept for item in found.sizes)
     assert all(item.value == 0.0 and item.interval is None and item.helps for item in found.sizes)
     assert mounting_effects(found) == mounting_effects(None) == ()
@@ -79,7 +79,7 @@ def test_an_imu_that_is_mounted_as_stated_stays_so():
 
 def test_a_tilt_is_what_all_drives_have_in_common():
     """Noses down by 4 degrees: gravity reads backwards. Grounds of the drives slope by another degree each way."""
-    found = mounting_from(readings(tilt=0.07))
+    found = mounting_from(readings(tilt=0.07), 4)
     pitch = sizes(found)["imu_pitch"]
     assert pitch.kept
     assert pitch.interval[0] < 0.07 < pitch.interval[1]
@@ -89,14 +89,22 @@ def test_a_tilt_is_what_all_drives_have_in_common():
     assert pitch.value > LEAST["imu_pitch"]
 
 
+def test_one_drive_does_not_tell_a_tilt_from_a_bias():
+    """What its quarters read too much alike is a bias, or the ground that it drove on."""
+    alike = readings(tilt=0.07)
+    found = sizes(mounting_from(alike, 1))
+    assert not any(found[name].kept for name in ("imu_roll", "imu_pitch"))
+    assert "several drives" in found["imu_pitch"].helps
+    assert sizes(mounting_from(alike, 4))["imu_pitch"].kept
+
+
 def test_a_place_that_is_too_near_to_matter_is_not_kept():
-    found = sizes(mounting_from(readings((ImuLeverArm(0.05, 0.0),))))
+    found = sizes(mounting_from(readings((ImuLeverArm(0.05, 0.0),)), 4))
     assert not found["imu_x"].kept
 
 
 def test_halves_of_one_drive_judge_each_other():
-    one = readings((ImuMisalignment(0.2),), drives=2)
-    found = sizes(mounting_from(replace(one, group=one.group)))
+    found = sizes(mounting_from(readings((ImuMisalignment(0.2),), drives=2), 1))
     assert found["imu_yaw"].kept
     assert found["imu_yaw"].interval[0] < 0.2 < found["imu_yaw"].interval[1]
 

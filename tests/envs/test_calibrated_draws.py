@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import gymnasium
 import numpy as np
 import pytest
 
 from ddagr_gym.config import dump_config
-from ddagr_gym.envs.calibrated_draws import NAME, CalibratedDraws, GroundDraws, load_draws
+from ddagr_gym.envs.calibrated_draws import EFFECTS, NAME, CalibratedDraws, GroundDraws, load_draws
 from ddagr_gym.errors import InputError
 from ddagr_gym.parameters import Drivetrain
+from ddagr_gym.physics.effects import save_effects
 from ddagr_gym.presets import get_robot, get_soil
 
 ROBOT = replace(get_robot("warthog"), drivetrain=Drivetrain(command_delay=0.05, acceleration_limit=20.0))
@@ -48,6 +50,40 @@ def test_grounds_are_drawn_alike_and_one_can_be_chosen():
     strength = [math.tan(DRAWS.on("sand").draw_soil(rng).friction_angle) for _ in range(500)]
     nominal = math.tan(get_soil("lete_sand_wong").friction_angle)
     assert np.std(np.log(np.array(strength) / nominal)) == pytest.approx(0.0987, rel=0.1)
+
+
+SLOPING = replace(DRAWS.grounds[0], gradient=(0.04, -0.03), gradient_deviations=(0.004, 0.003))
+
+
+def test_a_ground_slopes_as_steeply_as_it_did_in_any_direction_of_the_rows():
+    rng = np.random.default_rng(3)
+    drawn = np.array([SLOPING.draw_gradient(rng) for _ in range(4000)])
+    steepness = np.hypot(*drawn.T)
+    # along the gradient the deviation is hypot(0.8 x 0.004, 0.6 x 0.003) = 0.0037
+    assert np.mean(steepness) == pytest.approx(0.05, abs=0.0005)
+    assert np.std(steepness) == pytest.approx(0.0037, rel=0.05)
+    # of 4000 directions the mean vector is 0.01 of their length at most, in 67 of 100
+    assert np.abs(drawn.mean(axis=0)).max() < 0.03 * 0.05
+    before = rng.bit_generator.state
+    assert DRAWS.grounds[0].draw_gradient(rng) == (0.0, 0.0)
+    assert rng.bit_generator.state == before
+
+
+def test_episodes_on_a_sloping_ground_slope(tmp_path):
+    (tmp_path / NAME).write_text(dump_config(replace(DRAWS, grounds=(SLOPING, DRAWS.grounds[1]))))
+    save_effects(tmp_path / EFFECTS, [])
+    environment = gymnasium.make("DDAGR-Turn-v0", calibration=tmp_path, randomisation=False)
+    angles = []
+    for seed in range(12):
+        environment.reset(seed=seed)
+        episode = environment.unwrapped.episode
+        angles.append(episode.slope[0])
+        assert (episode.slope[0] > 0.03) == (episode.soils.cohesion != get_soil("firm_ground").cohesion)
+    assert 0.0 in angles
+    assert max(angles) > 0.03
+    level = gymnasium.make("DDAGR-Turn-v0", calibration=tmp_path, ground="asphalt", randomisation=False)
+    level.reset(seed=0)
+    assert not level.unwrapped.batch.settings.sloping
 
 
 def test_the_file_reads_back(tmp_path):

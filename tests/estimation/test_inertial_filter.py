@@ -19,7 +19,8 @@ from ddagr_gym.estimation import (
     run_inertial_filter,
 )
 from ddagr_gym.estimation.columns import stack_columns
-from ddagr_gym.estimation.inertial_layout import GRAVITY, INERTIAL_STATE, PATCH_AHEAD
+from ddagr_gym.estimation.inertial_kernels import since_balance
+from ddagr_gym.estimation.inertial_layout import GRAVITY, INERTIAL_STATE, PATCH_AHEAD, WORK_SIZE
 from ddagr_gym.estimation.layout import COMMANDS
 from ddagr_gym.parameters import STANDARD_GRAVITY, Sensors
 from ddagr_gym.physics.effects.slope import Slope
@@ -130,6 +131,16 @@ def test_gaps_and_outliers_are_survived(level):
     assert np.isfinite(states).all()
     assert np.isnan(standardised[500:510, 2]).all()
     assert np.abs(states[1200:, 0] - level.columns["true_v_x"][1200:]).max() < 0.03
+
+
+@pytest.mark.parametrize("durations", [[0.008] * 5, [0.030, 0.001, 0.001, 0.002, 0.006]])
+def test_uneven_samples_count_for_as_long_as_they_last(durations):
+    """Forces are balanced over the time since the last balance; of even samples it has the bits of five of them."""
+    work = np.zeros(WORK_SIZE)
+    for _ in range(2):
+        passed = [since_balance(work, place, 5, duration) for place, duration in enumerate(durations, 1)]
+    assert passed[-1] == pytest.approx(sum(durations), rel=1e-14)
+    assert len(set(durations)) > 1 or passed[-1] == 5 * durations[0]
 
 
 def test_initial_state_and_names():
