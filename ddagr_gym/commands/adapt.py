@@ -42,16 +42,16 @@ class Arguments:
         diagnosis: folder that `ddagr diagnose` wrote, in place of recordings.
         calibration: folder that `ddagr calibrate` wrote, in place of robot and soil: alone, or with recordings that are
             compared with its ordinary drives (made without --no-bank then).
-        ground: of the calibration.
-        controller: that is adapted: B4, the force balance, or B6, the path tracker.
-        radius: of the turns [m].
-        speed: of the turns [m/s].
+        ground: the calibration's ground that the turns are made on.
+        controller: what is adapted: B4, the force balance, or B6, the path tracker.
+        radius: radius of the turns [m].
+        speed: speed of the turns [m/s].
         row_heading: direction of the rows in the world of the recordings' poses [rad]; it matters for slopes.
-        turns: driven for the report by either controller.
+        turns: how many turns each controller drives for the report.
         anyway: adapt to the refitted robot and soil where the recordings hold something without a name.
         map: shipped map by name or the path of one's own YAML file, for sources that are not imported yet.
-        seed: of all draws.
-        threads: of the diagnosis.
+        seed: random seed of all draws.
+        threads: threads of the diagnosis.
         overwrite: replace an output folder that an earlier command wrote.
     """
 

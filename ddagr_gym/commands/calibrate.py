@@ -39,8 +39,8 @@ class Arguments:
             Without it all drives are on one ground.
         soil: nominal soil (see `ddagr soils`) of all grounds, or NAME=SOIL of one; may be repeated.
         map: shipped map by name or the path of one's own YAML file, for sources that are not imported yet.
-        seed: of the resampled intervals.
-        threads: of the simulator, in each process.
+        seed: random seed of the resampled intervals.
+        threads: threads of the simulator, in each process.
         processes: for what does not depend on each other: the fits from several starts, and the drives of the bank;
             each holds the drives that it works on.
         cluster: a Ray cluster to run that on: "local" starts one of so many processors here, an address

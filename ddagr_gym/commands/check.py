@@ -35,7 +35,7 @@ class Arguments:
         output: folder for one figure and one JSON report for each run.
         overwrite: replace an output folder that an earlier check wrote.
         all: list the questions that passed, too.
-        seed: of the random resampling behind the intervals.
+        seed: random seed of the resampling behind the intervals.
         maximum_rows: refuse a recording with more rows or messages.
         maximum_bytes: refuse a recording that unpacks to more bytes.
     """

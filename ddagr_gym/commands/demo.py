@@ -47,12 +47,12 @@ class Arguments:
 
     Attributes:
         output: folder to write; one that an earlier command wrote is replaced.
-        radius: of the turn [m].
+        radius: radius of the turn [m].
         side: left or right.
-        seed: of the soil and the sensor noise.
+        seed: random seed of the soil and the sensor noise.
         recording: drive to replay, in any format that `ddagr import` takes; a simulated one that ships with the
             package when it is left out.
-        robot: that drove, where the recording does not say.
+        robot: the robot that drove, where the recording does not say.
         soil: from which the replay's refit starts.
     """
 

@@ -45,32 +45,33 @@ class Arguments:
             drives.json, and a diagnosis.json of each.
         robot: nominal robot (see `ddagr robots`), or the path of a YAML file with one's own; the one that the
             recordings name when it is left out.
-        soil: nominal soil (see `ddagr soils`), or the path of a YAML file with one's own; when it is left out that of
-            thresholds that are given or ship for the robot (thesis_a1 for the ddagr), else firm_ground at four times a
-            soil's usual uncertainty, for ground that is not known.
+        soil: nominal soil (see `ddagr soils`), or the path of a YAML file with one's own. When it is left out: the soil
+            of the thresholds, given or shipped for the robot (thesis_a1 for the ddagr); without any, firm_ground at
+            four times a soil's usual uncertainty, for ground that is not known.
         calibration: folder that `ddagr calibrate` wrote, whose robot, grounds and ordinary drives the recordings
             are compared with; robot, soil, thresholds, window and stride are left out then.
-        ground: of the calibration that the recordings are on; left out for one that it does not know.
+        ground: which of the calibration's grounds the recordings are on; left out for one that it does not know.
         before: drives of the same robot from before, when it was ordinary, all on one ground; with them robot and soil
             are where a fit to them begins.
         same_ground: the recordings are on the ground of the drives before.
-        other_ground: they are on another one: its soil is free, and no change of soil has a name; so it is when neither
-            is said.
+        other_ground: the recordings are on another ground than the drives before: its soil is fitted, and no change of
+            soil is named. Assumed when neither is said.
         map: shipped map by name or the path of one's own YAML file, for sources that are not imported yet.
-        thresholds: of `ddagr null-bank`, made with these or similar drives; those that ship with the package when it is
-            left out.
-        soil_uncertainty: factor on how far the soil may be from the nominal one; larger where it is only guessed. The
-            thresholds must be of the same. 1 beside a soil.
-        window: length of the windows [s]; that of the thresholds when it is left out, with --before 4 s.
+        thresholds: file that `ddagr null-bank` wrote, from these or similar drives: what evidence for an effect must
+            exceed before it is named; those that ship with the package when it is left out.
+        soil_uncertainty: factor on how far the soil may be from the nominal one: 1 where a soil is named, larger where
+            it is only guessed. Thresholds must have been made with the same.
+        window: length of the windows that recordings are cut into [s]; that of the thresholds when it is left out, with
+            --before 4 s.
         stride: seconds between the starts of windows; their length, which uses all samples, when it is left out.
-        seed: of the resampling.
-        threads: of the simulator.
+        seed: random seed of the resampling.
+        threads: threads of the simulator.
         mcap: file to write for Foxglove and PlotJuggler: drives, predictions of the nominal, the refitted and the
             corrected simulator, residuals over the noise, and findings with their stretches; a layout is put beside it.
             Needs foxglove-sdk.
         rrd: file to write for Rerun, with the same. Needs rerun-sdk.
-        processes: of a folder with --calibration, how many drives at a time; each takes 0.3 to 1 GB.
-        cluster: of a folder with --calibration, a Ray cluster to work on: "local" starts one of so many processors
+        processes: for a folder with --calibration: how many drives at a time; each takes 0.3 to 1 GB.
+        cluster: for a folder with --calibration: a Ray cluster to work on: "local" starts one of so many processors
             here, an address (ray://HOST:PORT) takes one that runs.
         names_only: only name what is missing: no errors on unseen drives, no unnamed terms, no next drive, no page.
         overwrite: replace an output folder that an earlier command wrote.

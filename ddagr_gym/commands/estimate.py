@@ -30,7 +30,7 @@ class Arguments:
         run: recording, as `ddagr check` takes it; none with --thesis.
         thesis: drive and estimate the run of this table of the thesis's chapter 6 instead.
         robot: robot that drove (ddagr robots); the one that the recording names when it is left out.
-        motor_rate: of its speed loop [1/s], where it is not the preset's.
+        motor_rate: rate of the robot's speed loop [1/s], where it is not the preset's.
         soil: with --thesis the soil to drive on; else the soil whose parameters the figures shall show for comparison.
         map: column map, for sources that are not imported yet.
         filter: ours, or the thesis's eight-state filter.
@@ -38,7 +38,7 @@ class Arguments:
         attitude: our filter uses the recorded roll and pitch; only right where they count from the horizon.
         output: folder to write.
         overwrite: replace an output folder that an earlier command wrote.
-        seed: of the simulated run, and of what is resampled.
+        seed: random seed of the simulated run, and of what is resampled.
     """
 
     run: Positional[Path | None] = None

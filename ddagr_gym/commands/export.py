@@ -31,12 +31,12 @@ class Arguments:
         source: folder that `ddagr diagnose` or `ddagr calibrate` wrote.
         to: mujoco (robot.xml), gazebo (model.sdf) or randomisation (randomisation.yaml).
         output: folder to write.
-        ground: of a calibration with several.
+        ground: which ground of a calibration that has several.
         robot: name or YAML file, for a diagnosis without robot.yaml (one against a calibration).
         soil: name or YAML file, likewise.
         speed: rim speed of the working point [m/s]; 0.3 times the largest by default.
         draws: number of draws that ranges come from.
-        seed: of the draws.
+        seed: random seed of the draws.
         overwrite: replace an output folder that an earlier command wrote.
     """
 

@@ -40,7 +40,7 @@ class Arguments:
             whether to import with it. Where nobody can answer, nothing is imported.
         map_output: YAML file for the proposed map; beside --output with the ending .topics.yaml when it is left out.
         yes: import with the proposed map without asking.
-        namespace: of one robot in a bag of several, /robot1; with --guess.
+        namespace: which robot of a bag that holds several, such as /robot1; with --guess.
         maximum_rows: refuse a recording with more rows or messages.
         maximum_bytes: refuse a recording that unpacks to more bytes.
     """

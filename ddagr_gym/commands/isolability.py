@@ -33,7 +33,7 @@ class Arguments:
         soil_uncertainty: as for `ddagr diagnose`.
         thresholds: gates of `ddagr null-bank`; by default those that ship for the robot, and where none do those that
             normal noise alone asks for (chi-square): real drives need larger sizes then.
-        seed: of the sensor noise.
+        seed: random seed of the sensor noise.
         overwrite: replace an output folder that an earlier command wrote.
     """
 

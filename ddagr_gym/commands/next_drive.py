@@ -31,8 +31,8 @@ class Arguments:
         robot: nominal robot; that of the diagnosis by default, ddagr without one.
         soil: nominal soil; that of the diagnosis by default, thesis_a1 without one.
         sensors: some of imu, encoders, pose; those of the diagnosis by default.
-        seed: of the sensor noise.
-        threads: of the simulator.
+        seed: random seed of the sensor noise.
+        threads: threads of the simulator.
     """
 
     diagnosis: Positional[Path | None] = None

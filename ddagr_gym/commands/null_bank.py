@@ -54,11 +54,11 @@ class Arguments:
         soil: nominal soil: name (ddagr soils) or YAML file; as for `ddagr diagnose` when it is left out.
         map: column map, for sources that are not imported yet.
         count: null drives to simulate; at least 20 for the level of 5 percent.
-        seed: of the bank.
+        seed: random seed of the bank.
         soil_uncertainty: as for `ddagr diagnose`.
         window: length of the windows [s]; diagnoses with these thresholds cut recordings in the same way.
         stride: seconds between the starts of windows; their length, which uses all samples, when it is left out.
-        processes: that work at the same time, or processors of a local cluster.
+        processes: how many processes work at the same time, or processors of a local cluster.
         cluster: a Ray cluster to work on: "local" starts one here, an address (ray://HOST:PORT) takes one that runs.
     """
 

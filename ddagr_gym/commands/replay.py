@@ -38,15 +38,15 @@ class Arguments:
         robot: robot that drove (see `ddagr robots`), or a YAML file with one's own; that of the recordings when it is
             left out.
         calibration: folder that `ddagr calibrate` wrote, whose robot, soil and sensors are taken as they are.
-        ground: of the calibration; may be left out where it has only one.
+        ground: the calibration's ground that the drive is on; may be left out where it has only one.
         map: shipped map by name or the path of one's own YAML file, for sources that are not imported yet.
         effects: missing physics to add, name=size or an effects file; may be repeated.
         window: length of the windows with free initial states [s]; fit with windows as long as the horizon that counts.
         refit: fit soil and uncertain robot parameters.
         together: let all runs share one set of fitted parameters; otherwise each is fitted on its own.
         overwrite: replace an output folder that an earlier command wrote.
-        threads: of the simulator.
-        seed: of the resampled intervals.
+        threads: threads of the simulator.
+        seed: random seed of the resampled intervals.
         maximum_rows: refuse a recording with more rows or messages.
         maximum_bytes: refuse a recording that unpacks to more bytes.
     """

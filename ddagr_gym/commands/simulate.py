@@ -33,7 +33,7 @@ class Arguments:
         rate: sensor samples per second [Hz].
         pose_rate: fixes of a pose receiver per second [Hz]; 0 for none.
         noise: sensor noise; --no-noise for ideal sensors.
-        seed: of the sensor noise.
+        seed: random seed of the sensor noise.
         fine: converged numerics, about forty times slower, instead of the default (nine in ten force errors below
             1.3e-3).
     """

@@ -35,14 +35,14 @@ class Arguments:
         what: algorithm of one training, or "all" for every published policy with its record and model card; left out
             with a sweep.
         config: name of a file in configs/training, or a YAML file.
-        seed: of the training.
+        seed: random seed of the training.
         output: folder for checkpoints, TensorBoard, results and policies.
         set: changes of the configuration, as ppo.learning_rate=3e-4.
         publish: with "all", replace the policies in agents/policies by the result.
         sweep: YAML file with configurations and the number of seeds; the output folder gets their trainings, sweep.csv
             and sweep.png.
-        workers: of a sweep, trainings at a time, or processors of a local cluster.
-        cluster: of a sweep, a Ray cluster to train on with Ray Tune: "local" starts one here, an address
+        workers: for a sweep: trainings at a time, or processors of a local cluster.
+        cluster: for a sweep: a Ray cluster to train on with Ray Tune: "local" starts one here, an address
             (ray://HOST:PORT) takes one that runs, whose nodes see the output folder.
     """
 
