@@ -21,6 +21,7 @@ import tyro
 from ddagr_gym import __version__, commands
 from ddagr_gym.errors import InputError, InputWarning
 from ddagr_gym.extras import missing_extra
+from ddagr_gym.option_help import shown_options
 from ddagr_gym.tasks.task import FailedTasksError
 
 _HELP = ("-h", "--help")
@@ -158,7 +159,8 @@ def _parse(command: commands.Command, words: list[str]) -> Any | None:
     complaint = io.StringIO()
     try:
         with contextlib.redirect_stderr(complaint):
-            return tyro.cli(command.arguments, prog=program, args=words)
+            given = tyro.cli(shown_options(command.arguments), prog=program, args=words)
+            return command.arguments(**vars(given))
     except SystemExit as stop:
         if not stop.code:
             print("\nExamples:\n" + "\n".join(f"  {example}" for example in command.examples))

@@ -101,6 +101,14 @@ def readme_lines() -> list[str]:
     return lines + [" ".join(code.split()) for code in re.findall(r"`(\./ddagr\b[^`]*)`", text)]
 
 
+@pytest.mark.parametrize("name", commands.NAMES)
+def test_help_shows_no_default_that_stands_for_nothing(name, capsys):
+    assert cli.main([name, "--help"]) == 0
+    shown = capsys.readouterr().out
+    for nothing in ("None", "(default: )", "(default: '')"):
+        assert nothing not in shown
+
+
 def test_readme_shows_command_lines():
     named = {words[1] for line in readme_lines() if len(words := line.split()) > 1}
     assert {"demo", "simulate", "check", "replay", "diagnose", "train", "evaluate"} <= named
