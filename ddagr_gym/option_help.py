@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import types
 from pathlib import Path
-from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
 import tyro
 
@@ -48,4 +48,6 @@ def _word(kind: Any) -> str | None:
     if get_origin(bare) not in (Union, types.UnionType):
         return None
     given = [option for option in get_args(bare) if option is not type(None)]
+    if get_origin(given[0]) is Literal:
+        return f"{{{','.join(map(str, get_args(given[0])))}}}"
     return _WORDS.get(given[0]) if len(given) == 1 else None
