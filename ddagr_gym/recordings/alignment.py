@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ddagr_gym.errors import InputError
+from ddagr_gym.recordings.channels import COMMANDS
 from ddagr_gym.recordings.schema import FloatArray
 
 IndexArray = npt.NDArray[np.int64]
@@ -61,6 +62,19 @@ def nearest_rows(base: FloatArray, t: FloatArray, tolerance: float) -> tuple[Ind
     return row[order[first]], order[first]
 
 
+def _with_held(
+    base: FloatArray, t: FloatArray, tolerance: float, rows: IndexArray, samples: IndexArray
+) -> tuple[IndexArray, IndexArray]:
+    """Matches with those of commands that are far from every row: the last one before a free row is held there."""
+    far = np.setdiff1d(np.arange(len(t)), samples)
+    later = np.searchsorted(base, t[far])
+    inside = later < len(base)
+    far, later = far[inside], later[inside]
+    last = np.append(np.diff(later) > 0, True) if far.size else np.empty(0, dtype=bool)
+    free = last & (base[later] - t[far] > tolerance) & ~np.isin(later, rows)
+    return np.concatenate([rows, later[free]]), np.concatenate([samples, far[free]])
+
+
 def regular_base(start: float, stop: float, rate: float, most_rows: int) -> FloatArray:
     """Rows at a fixed rate.
 
@@ -96,13 +110,16 @@ def align(
 
     Returns:
         channels (n,) by name, NaN where a stream has no sample near a row; and how many samples of each role
-        found no row of their own.
+        found no row of their own. A command holds until the next one: with no row near it, it stands at the first
+        one after it, unless a later command does.
     """
     channels: dict[str, FloatArray] = {}
     lost = {}
     for role, stream in streams.items():
         ordered = stream.sorted()
         rows, samples = nearest_rows(base, ordered.t, tolerance)
+        if set(ordered.channels) <= set(COMMANDS):
+            rows, samples = _with_held(base, ordered.t, tolerance, rows, samples)
         lost[role] = len(stream.t) - len(rows)
         for name, values in ordered.channels.items():
             if name not in channels:

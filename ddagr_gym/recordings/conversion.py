@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from ddagr_gym.errors import InputError
 from ddagr_gym.recordings.column_map import BodyCommands, ColumnMap, HeldChannels
+from ddagr_gym.recordings.equal_times import joined_rows
 from ddagr_gym.recordings.plausible import check_stamps
 from ddagr_gym.recordings.schema import (
     BoolArray,
@@ -28,8 +29,8 @@ from ddagr_gym.recordings.schema import (
 from ddagr_gym.recordings.units import channel_factor, factor
 
 MOST_REPEATED = 0.5
-"""Share of rows that repeat the time of the row before up to which they are left out (ours): a log that writes rows
-twice. With more the clock stands still, or is coarser than the log."""
+"""Share of rows that repeat the time of the row before, and say nothing new, up to which they are left out (ours): a
+log that writes rows twice. With more the clock stands still, or is coarser than the log."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +77,7 @@ def build_recording(
         InputError: no rows, unsorted or missing times, or a conversion that lacks the robot.
     """
     notes: list[str] = []
-    table, duplicates = _without_duplicates(table, column_map, notes)
+    table, duplicates = _one_row_a_time(table, column_map, notes)
     t, start_time, spans, segments = _time_base(table, column_map, notes)
     channels = _channels(table, column_map, geometry, notes)
     if not any(np.isfinite(values).any() for values in channels.values()):
@@ -116,8 +117,9 @@ def _changes(table: RawTable, names: tuple[str, ...]) -> BoolArray:
     return changed
 
 
-def _without_duplicates(table: RawTable, column_map: ColumnMap, notes: list[str]) -> tuple[RawTable, int]:
-    clock, _ = _clock(table, column_map)
+def _one_row_a_time(table: RawTable, column_map: ColumnMap, notes: list[str]) -> tuple[RawTable, int]:
+    """Rows of one time stamp as one, and how many of them said nothing new."""
+    clock, absolute = _clock(table, column_map)
     if not clock.size:
         raise InputError("the file has a header but no rows: give a recording with samples.")
     bad = np.flatnonzero(~np.isfinite(clock))
@@ -127,9 +129,11 @@ def _without_duplicates(table: RawTable, column_map: ColumnMap, notes: list[str]
         )
     check_stamps(clock)
     new_span = _changes(table, column_map.pieces.span_columns)
+    _check_order(clock, new_span & (not absolute))
     repeated = np.zeros(clock.size, dtype=bool)
     repeated[1:] = (np.diff(clock) == 0) & ~new_span[1:]
-    count = int(np.count_nonzero(repeated))
+    numbers, adding = joined_rows(table.numbers, repeated)
+    count = int(np.count_nonzero(repeated & ~adding))
     if count > MOST_REPEATED * clock.size:
         raise InputError(
             f"{count} of {clock.size} rows repeat the time of the row before: {column_map.time.column} stands still or "
@@ -137,8 +141,19 @@ def _without_duplicates(table: RawTable, column_map: ColumnMap, notes: list[str]
         )
     if count:
         notes.append(f"{count} rows that repeated the time of the row before were left out.")
-        table = table.rows(~repeated)
-    return table, count
+    if adding.any():
+        notes.append(f"{np.count_nonzero(adding)} rows with the time of the row before were joined with it.")
+    return replace(table.rows(~repeated), numbers=numbers), count
+
+
+def _check_order(clock: FloatArray, restarts: BoolArray) -> None:
+    """Refuse times that go back but where they may restart; InputError."""
+    back = np.flatnonzero((np.diff(clock) < 0) & ~restarts[1:])
+    if back.size:
+        raise InputError(
+            f"time goes back from {clock[back[0]]:g} s to {clock[back[0] + 1]:g} s after row {back[0] + 1}: sort the "
+            "rows, or name the column that numbers the pieces under span_columns in the map."
+        )
 
 
 def _time_base(table: RawTable, column_map: ColumnMap, notes: list[str]) -> tuple[FloatArray, float, Ranges, Ranges]:
@@ -146,12 +161,6 @@ def _time_base(table: RawTable, column_map: ColumnMap, notes: list[str]) -> tupl
     clock, absolute = _clock(table, column_map)
     pieces = column_map.pieces
     new_span = _changes(table, pieces.span_columns)
-    back = np.flatnonzero((np.diff(clock) < 0) & ~(new_span[1:] & (not absolute)))
-    if back.size:
-        raise InputError(
-            f"time goes back from {clock[back[0]]:g} s to {clock[back[0] + 1]:g} s after row {back[0] + 1}: sort the "
-            "rows, or name the column that numbers the pieces under span_columns in the map."
-        )
     spans = _ranges(new_span)
     joined = _changes(table, pieces.segment_columns)
     t = clock - clock[0]

@@ -2,12 +2,15 @@
 
 Headings and yaw rates are judged by the gyro, which is exact over seconds; position, speed and once more heading by
 the poses, whose time is uncertain; bank speeds by the encoders. A window starts at the state that the samples around
-its start suggest, the same for every model.
+its start suggest, the same for every model. Where poses have no headings, such as fixes of a satellite receiver, the
+start's heading is their course.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +39,9 @@ LAST = 0.5
 SPEED_TIME = 1.0
 """Time over which a speed is taken from poses [s] (ours): five poses at 5 Hz."""
 LEAST_GYRO_SHARE = 0.9
-"""Share of the samples that an integral of the gyro needs (ours)."""
+"""Of the samples of the window with the most, what an integral of the gyro needs (ours)."""
+LEAST_WAY = 0.5
+"""On which a course is the heading [m] (ours): twenty times the scatter of a good satellite fix."""
 
 _GYRO = CHANNELS.index("yaw_rate")
 _ENCODERS = [CHANNELS.index("encoder_right"), CHANNELS.index("encoder_left")]
@@ -63,18 +68,31 @@ def horizon_errors(windows: WindowSet, prediction: Array) -> dict[str, Array]:
 
 
 def integrated(rate: Array, period: float) -> Array:
-    """Integral over each window (W,) of rates (W, T); missing ones count as the mean, NaN where too many are."""
-    share = np.isfinite(rate).mean(axis=1)
-    return np.where(share >= LEAST_GYRO_SHARE, _mean(rate) * rate.shape[1] * period, np.nan)
+    """Integral over each window (W,) of rates (W, T), NaN where too many are missing."""
+    return np.asarray(_turned(rate, period)[:, -1])
 
 
 def heading_growth(windows: WindowSet, prediction: Array) -> Array:
     """Root mean square heading error over the windows after each sample, (T,) [rad], by the gyro."""
-    error = np.nan_to_num(prediction[..., _GYRO] - windows.measured[..., _GYRO])
-    known = np.isfinite(windows.measured[..., _GYRO]).mean(axis=1) >= LEAST_GYRO_SHARE
+    errors = _turned(prediction[..., _GYRO] - windows.measured[..., _GYRO], windows.period)
+    known = np.isfinite(errors[:, -1])
     if not known.any():
         return np.full(windows.samples, np.nan)
-    return np.asarray(np.sqrt(np.mean((np.cumsum(error[known], axis=1) * windows.period) ** 2, axis=0)))
+    return np.asarray(np.sqrt(np.mean(errors[known] ** 2, axis=0)))
+
+
+def _turned(rate: Array, period: float) -> Array:
+    """Integral of rates (W, T) until each sample; between samples they change evenly, NaN where too many are missing.
+
+    A sensor that is slower than the rows has its own rate in every window.
+    """
+    known = np.isfinite(rate)
+    count = known.sum(axis=1)
+    turned = np.full(rate.shape, np.nan)
+    for w in np.flatnonzero((count > 0) & (count >= LEAST_GYRO_SHARE * count.max(initial=0))):
+        places = np.flatnonzero(known[w])
+        turned[w] = period * np.cumsum(np.interp(np.arange(rate.shape[1]), places, rate[w, places]))
+    return turned
 
 
 def _mean(values: Array) -> Array:
@@ -85,7 +103,10 @@ def _mean(values: Array) -> Array:
 
 
 def _pose_errors(windows: WindowSet, prediction: Array) -> dict[str, Array]:
-    """Heading, position and speed errors; the start's heading comes from all poses of a window through the gyro."""
+    """Heading, position and speed errors; the start's heading comes from all poses of a window through the gyro.
+
+    Where nothing tells that heading there is no error of position.
+    """
     errors = {name: np.full(windows.count, np.nan) for name in ("heading_pose", "position", "speed")}
     known = np.asarray(np.isfinite(windows.measured[..., _XY]).all(axis=-1))
     reach, back = round(LAST / windows.period), round(SPEED_TIME / windows.period)
@@ -99,8 +120,8 @@ def _pose_errors(windows: WindowSet, prediction: Array) -> dict[str, Array]:
         rotation = rotation_matrix(0.0 if np.isnan(turn) else turn)
         moved = (prediction[w][:, _XY] - windows.initial[w, :2]) @ rotation.T
         measured = windows.measured[w][:, _XY] - windows.initial[w, :2]
-        errors["position"][w] = np.hypot(*(moved[end] - measured[end]))
         if np.isfinite(turn):
+            errors["position"][w] = np.hypot(*(moved[end] - measured[end]))
             change = windows.measured[w, end, _YAW] - start_heading[w]
             errors["heading_pose"][w] = wrap_angle(prediction[w, end, _YAW] - windows.initial[w, 2] - change)
         earlier = rows[np.argmin(np.abs(rows - (end - back)))]
@@ -113,16 +134,34 @@ def _pose_errors(windows: WindowSet, prediction: Array) -> dict[str, Array]:
 def start_headings(windows: WindowSet) -> Array:
     """Heading at the start (W,) [rad]: circular mean over the window's poses less what the gyro turned until them.
 
-    Without a gyro the first guess; NaN where no pose has a heading.
+    Without a gyro the first guess. Where no pose has a heading, by the course; NaN where that tells none either.
     """
     yaw = windows.measured[..., _YAW]
     known = np.isfinite(yaw)
-    gyro = windows.measured[..., _GYRO]
-    with_gyro = np.isfinite(gyro).mean(axis=1) >= LEAST_GYRO_SHARE
-    turned = np.cumsum(np.nan_to_num(gyro), axis=1) * windows.period
-    start = np.where(known, np.exp(1j * (np.nan_to_num(yaw) - turned)), 0.0).sum(axis=1)
+    turned = _turned(windows.measured[..., _GYRO], windows.period)
+    with_gyro = np.isfinite(turned[:, -1])
+    start = np.where(known, np.exp(1j * (np.nan_to_num(yaw) - np.nan_to_num(turned))), 0.0).sum(axis=1)
     heading = np.where(with_gyro, np.angle(start), windows.initial[:, 2])
-    return np.where(known.any(axis=1), heading, np.nan)
+    found = np.where(known.any(axis=1), heading, np.nan)
+    for w in np.flatnonzero(with_gyro & ~known.any(axis=1)):
+        found[w] = _start_course(windows.measured[w], turned[w])
+    return found
+
+
+def _start_course(measured: Array, turned: Array) -> float:
+    """Heading at the start [rad] with which a robot that does not slip sideways goes from fix to fix; NaN for no way.
+
+    Args:
+        measured: (T, 8) of one window.
+        turned: (T,) since the start [rad].
+    """
+    fixes = np.flatnonzero(np.isfinite(measured[:, _XY]).all(axis=1))
+    rolled = np.nan_to_num(_mean(measured[:, _ENCODERS]))
+    way = 0.0j
+    for a, b in pairwise(fixes.tolist()):
+        step = complex(*(measured[b, _XY] - measured[a, _XY]))
+        way += np.sign(rolled[a : b + 1].sum()) * step * np.exp(-0.5j * (turned[a] + turned[b]))
+    return float(np.angle(way)) if abs(way) >= LEAST_WAY else math.nan
 
 
 def sample_errors(windows: WindowSet, prediction: Array, channels: Sequence[int]) -> tuple[Array, Integers]:

@@ -74,3 +74,20 @@ def test_a_regular_base_and_its_limit():
         regular_base(0.0, 1e9, 100.0, 1000)
     with pytest.raises(InputError, match="Hz"):
         regular_base(0.0, 1.0, 0.0, 1000)
+
+
+def test_a_command_far_from_every_row_holds_from_the_next_one_on():
+    """No rows from 1 to 3 s: of two commands meanwhile the later one is in force then."""
+    base = np.array([0.0, 0.5, 1.0, 3.0, 3.5])
+    stamps = np.array([-9.0, -5.0, 0.5, 1.6, 2.4, 9.0])
+    values = np.arange(6.0)
+    commands = Stream(stamps, {"command_right": values, "command_left": -values})
+    channels, lost = align(base, {"command": commands}, 0.1)
+    np.testing.assert_array_equal(channels["command_right"], [1.0, 2.0, np.nan, 4.0, np.nan])
+    assert lost == {"command": 3}
+    later = Stream(np.array([2.4, 3.05]), {"command_right": np.array([1.0, 2.0])})
+    np.testing.assert_array_equal(align(base, {"command": later}, 0.1)[0]["command_right"][3], 2.0)
+    other = Stream(stamps, {"yaw_rate": values})
+    np.testing.assert_array_equal(
+        align(base, {"imu": other}, 0.1)[0]["yaw_rate"], [np.nan, 2.0, np.nan, np.nan, np.nan]
+    )

@@ -73,6 +73,24 @@ def test_repeated_rows_are_left_out_and_counted():
     assert recording.meta.duplicates_dropped == 1
 
 
+def test_rows_of_several_sensors_with_one_stamp_are_one_row():
+    nan = np.nan
+    gyro, wheel = [1.0, nan, 2.0, nan, 9.0, nan], [nan, 5.0, nan, nan, nan, 6.0]
+    rows = table(t=[0, 0, 1, 1, 1, 2], gz=gyro, w=wheel)
+    column_map = ColumnMap(TimeSource("t"), YAW | {"encoder_right": ColumnSource("w")})
+    recording = build_recording(rows, column_map, None)
+    np.testing.assert_array_equal(recording.t, [0, 1, 2])
+    np.testing.assert_array_equal(recording["yaw_rate"], [1, 2, nan])
+    np.testing.assert_array_equal(recording["encoder_right"], [5, nan, 6])
+    assert recording.meta.duplicates_dropped == 2
+    assert any("1 rows with the time of the row before were joined" in note for note in recording.meta.notes)
+
+
+def test_times_that_go_back_are_refused_by_the_row_of_the_file():
+    with pytest.raises(InputError, match=r"time goes back from 3 s to 2\.5 s after row 5"):
+        build_recording(table(t=[0, 1, 1, 1, 3, 2.5], gz=np.ones(6)), ColumnMap(TimeSource("t"), YAW), None)
+
+
 @pytest.mark.parametrize("times", [np.full(10, 5.0), np.floor(np.arange(10) / 4.0)])
 def test_a_clock_that_stands_still_or_is_coarse_is_refused(times):
     with pytest.raises(InputError, match=r"of 10 rows repeat the time of the row before: t stands still"):

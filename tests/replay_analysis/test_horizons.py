@@ -88,9 +88,39 @@ def test_a_pose_that_ends_early_judges_nothing(judged):
     assert errors["position"][1] == pytest.approx(0.0, abs=1e-9)
 
 
-def test_a_few_missing_gyro_samples_count_as_the_mean():
-    rate = np.full((1, 100), 0.1)
+def test_between_the_samples_of_a_gyro_its_rate_changes_evenly(judged):
+    rate = np.tile(np.linspace(0.0, 0.2, 100), (3, 1))
     rate[0, 3:9] = np.nan
-    assert integrated(rate, 0.05)[0] == pytest.approx(0.5)
-    rate[0, 3:30] = np.nan
-    assert np.isnan(integrated(rate, 0.05)[0])
+    rate[1, 3:30] = np.nan
+    found = integrated(rate, 0.05)
+    assert found[[0, 2]] == pytest.approx([0.5, 0.5])
+    assert np.isnan(found[1])
+    windows, exact = judged
+    wrong = exact.copy()
+    wrong[..., GYRO] += 0.02
+    measured = exact.copy()
+    measured[:, ::2, GYRO] = np.nan  # a gyro of half the rate
+    slow = replace(windows, measured=measured)
+    np.testing.assert_allclose(horizon_errors(slow, wrong)["heading"], 0.02 * 5.0)
+    np.testing.assert_allclose(heading_growth(slow, wrong)[-1], 0.02 * 5.0)
+
+
+@pytest.mark.parametrize("backwards", [False, True])
+def test_fixes_without_headings_are_followed_in_their_course(make_windows, backwards):
+    """The path turns as the fixes do, and whoever goes astray is as far from them as beside poses with headings."""
+    speeds = np.array([3.0, 2.0]) * (-1.0 if backwards else 1.0)
+    windows = make_windows(np.broadcast_to(speeds, (2, 120, 2)).copy())
+    exact = KinematicModel(0.25, 0.5).predict(windows)
+    angle = 2.0
+    measured = exact.copy()
+    measured[..., POSE[0]] = np.cos(angle) * exact[..., POSE[0]] - np.sin(angle) * exact[..., POSE[1]]
+    measured[..., POSE[1]] = np.sin(angle) * exact[..., POSE[0]] + np.cos(angle) * exact[..., POSE[1]]
+    measured[..., YAW] = np.nan
+    fixes = replace(windows, measured=measured)
+    np.testing.assert_allclose(start_headings(fixes), angle, atol=2e-3)
+    np.testing.assert_allclose(horizon_errors(fixes, exact)["position"], 0.0, atol=0.01)
+    wrong = exact.copy()
+    wrong[..., POSE[0]] += np.linspace(0.0, 0.3, 100)
+    assert horizon_errors(fixes, wrong)["position"] == pytest.approx([0.3, 0.3], abs=0.01)
+    standing = replace(fixes, measured=np.where(np.isnan(measured), np.nan, measured[:, :1]))
+    assert np.isnan(horizon_errors(standing, exact)["position"]).all()
