@@ -33,8 +33,21 @@ def _first(message: Any, *names: str) -> float:
 
 def number(message: Any, path: str) -> float:
     """Number at a dotted path; NaN where there is none."""
-    value = field_of(message, path)
+    return as_number(field_of(message, path))
+
+
+def as_number(value: Any) -> float:
+    """Value as a number; NaN where it is none, as ``null`` in JSON."""
     try:
         return float(value)
     except (TypeError, ValueError, OverflowError):
         return math.nan
+
+
+def is_unknown(message: Any, field: str) -> bool:
+    """Whether an Imu message says that it does not measure a field: the first of its covariance is -1 (REP 145)."""
+    covariance = field_of(message, f"{field}_covariance")
+    try:
+        return as_number(covariance[0]) == -1.0
+    except (TypeError, LookupError):
+        return False

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from ddagr_gym.errors import InputError
 from ddagr_gym.recordings.frames import FrameTree, frame_name, turned_into
-from ddagr_gym.recordings.message_fields import field_of, number
+from ddagr_gym.recordings.message_fields import as_number, field_of, is_unknown, number
 from ddagr_gym.recordings.schema import FloatArray, RobotGeometry, bank_speeds
 from ddagr_gym.recordings.topic_map import TRANSFORMS, TopicSource
 
@@ -29,6 +29,11 @@ EARTH_RADIUS = 6378137.0
 """WGS 84 equatorial radius [m]."""
 EARTH_ECCENTRICITY_SQUARED = 6.69437999014e-3
 """WGS 84 first eccentricity squared [-]."""
+MOST_NAMED = 20
+"""Joints that a message to the user names (ours)."""
+MOST_JOINTS = 200
+"""Joints of one topic beyond which further names are not joints of a robot (ours)."""
+_LISTS = (list, tuple, np.ndarray)
 
 
 def imu(source: TopicSource, rotations: Rotations | None = None) -> Extractor:
@@ -40,70 +45,103 @@ def imu(source: TopicSource, rotations: Rotations | None = None) -> Extractor:
     """
 
     def extract(message: Any) -> Sample:
-        force = [number(message, f"linear_acceleration.{axis}") for axis in "xyz"]
-        turn = [number(message, f"angular_velocity.{axis}") for axis in "xyz"]
+        force, turn = _vector(message, "linear_acceleration"), _vector(message, "angular_velocity")
         rotation = None if rotations is None else rotations(message)
         if rotation is not None:
             force, turn = (rotation @ force).tolist(), (rotation @ turn).tolist()
         sample = {f"specific_force_{axis}": value for axis, value in zip("xyz", force, strict=True)}
         sample["yaw_rate"] = turn[2]
         if source.orientation:
-            sample["roll"], sample["pitch"], _ = attitude(message, "orientation", rotation)
+            known = not is_unknown(message, "orientation")
+            found = attitude(message, "orientation", rotation) if known else (math.nan, math.nan, math.nan)
+            sample["roll"], sample["pitch"], _ = found
         return sample
 
     return extract
 
 
-def joint_state(source: TopicSource) -> Extractor:
-    """sensor_msgs/JointState: mean speed of the joints whose names match each bank's patterns."""
-
-    def extract(message: Any) -> Sample:
-        names = [str(name) for name in field_of(message, "name") or ()]
-        speeds = field_of(message, "velocity")
-        if speeds is None or len(speeds) != len(names):
-            raise InputError(
-                f"a JointState message has {len(names)} joints and {0 if speeds is None else len(speeds)} speeds: "
-                "record the wheel joints' velocity."
-            )
-        return {
-            "encoder_right": _bank_mean("right", names, speeds, source.right),
-            "encoder_left": _bank_mean("left", names, speeds, source.left),
-        }
-
-    return extract
+def _vector(message: Any, field: str) -> list[float]:
+    """Reading (3,) of an Imu message; NaN where it has none."""
+    if is_unknown(message, field):
+        return [math.nan] * 3
+    return [number(message, f"{field}.{axis}") for axis in "xyz"]
 
 
-def joint_speeds(joints: Sequence[str]) -> Extractor:
-    """sensor_msgs/JointState: the speed of each joint by its name; no sample where a message has other joints.
+class BankSpeeds:
+    """Takes the mean speed of the joints whose names match each bank's patterns out of a sensor_msgs/JointState.
+
+    Several nodes may publish on one topic, each its own joints: a message without joints of both banks is no sample.
 
     Args:
-        joints: names as the messages have them.
+        source: entry of the topic map.
     """
-    wanted = list(joints)
+
+    def __init__(self, source: TopicSource) -> None:
+        self._patterns = {"right": source.right, "left": source.left}
+        self._messages = 0
+        self._seen: dict[str, None] = {}
+
+    def __call__(self, message: Any) -> Sample | None:
+        """Channels of a message; None where it lacks a bank."""
+        speeds = joint_velocities(message)
+        banks = {bank: [v for name, v in speeds if _matches(name, p)] for bank, p in self._patterns.items()}
+        if all(banks.values()):
+            return {f"encoder_{bank}": _mean(found) for bank, found in banks.items()}
+        self._messages += 1
+        if len(self._seen) < MOST_NAMED:
+            self._seen.update(dict.fromkeys(name for name, _ in speeds))
+        return None
+
+    def complaint(self) -> str:
+        """Why none of the messages so far is a sample; "" without messages."""
+        if not self._messages:
+            return ""
+        names = list(self._seen)
+        if not names:
+            return f"none of {self._messages} messages has a speed for each of its joints: record the wheels' velocity."
+        for bank, patterns in self._patterns.items():
+            if not any(_matches(name, patterns) for name in names):
+                return (
+                    f"no joint of {', '.join(names[:MOST_NAMED])} matches the {bank} bank's patterns "
+                    f"{', '.join(patterns)}: give patterns under topics, wheels, {bank}."
+                )
+        return (
+            f"none of {self._messages} messages has joints of both banks ({', '.join(names[:MOST_NAMED])}): publish "
+            "right and left wheels in one JointState."
+        )
+
+
+def joint_speeds() -> Extractor:
+    """sensor_msgs/JointState: the speed of each joint by its name; no sample where a message has none."""
+    known: set[str] = set()
 
     def extract(message: Any) -> Sample | None:
-        speeds = field_of(message, "velocity")
-        names = [str(name) for name in field_of(message, "name") or ()]
-        if names != wanted or speeds is None or len(speeds) != len(wanted):
-            return None
-        return {name: float(speed) for name, speed in zip(wanted, speeds, strict=True)}
+        speeds = dict(joint_velocities(message))
+        known.update([name for name in speeds if name not in known][: MOST_JOINTS - len(known)])
+        return {name: speed for name, speed in speeds.items() if name in known} or None
 
     return extract
 
 
-def _bank_mean(bank: str, names: Sequence[str], speeds: Sequence[float], patterns: tuple[str, ...]) -> float:
-    lowered = tuple(pattern.lower() for pattern in patterns)
-    matched = [
-        float(speed)
-        for name, speed in zip(names, speeds, strict=True)
-        if any(fnmatch.fnmatchcase(name.lower(), pattern) for pattern in lowered)
-    ]
-    if not matched:
-        raise InputError(
-            f"no joint of {', '.join(names[:20]) or 'an empty JointState'} matches the {bank} bank's patterns "
-            f"{', '.join(patterns)}: give patterns under topics, wheels, {bank}."
-        )
-    return math.fsum(matched) / len(matched)
+def joint_velocities(message: Any) -> list[tuple[str, float]]:
+    """Names and speeds [rad/s] of a JointState's joints, NaN where unknown; none where it has not one for each."""
+    names, speeds = field_of(message, "name"), field_of(message, "velocity")
+    lists = isinstance(names, _LISTS) and isinstance(speeds, _LISTS)
+    if not lists or len(names) != len(speeds):
+        return []
+    return [(str(name), as_number(speed)) for name, speed in zip(names, speeds, strict=True)]
+
+
+def _matches(joint: str, patterns: tuple[str, ...]) -> bool:
+    return any(fnmatch.fnmatchcase(joint.lower(), pattern.lower()) for pattern in patterns)
+
+
+def _mean(speeds: Sequence[float]) -> float:
+    """Mean; NaN where it is no number (infinities of both signs)."""
+    try:
+        return math.fsum(speeds) / len(speeds)
+    except (ValueError, OverflowError):
+        return math.nan
 
 
 def twist(prefix: str, geometry: RobotGeometry) -> Extractor:
@@ -255,7 +293,7 @@ def extractor(
         )
     makers: dict[str, Callable[[], Extractor]] = {
         "Imu": lambda: imu(source, turned_into(source.frame, frames, file_name) if source.frame else None),
-        "JointState": lambda: joint_state(source),
+        "JointState": lambda: BankSpeeds(source),
         "Odometry": lambda: pose("pose.pose"),
         "PoseWithCovarianceStamped": lambda: pose("pose.pose"),
         "PoseStamped": lambda: pose("pose"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from array import array
 from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
@@ -9,15 +10,17 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
 from ddagr_gym.errors import InputError
 from ddagr_gym.recordings.alignment import Stream, align, regular_base
+from ddagr_gym.recordings.arrival import StepBack, step_back
 from ddagr_gym.recordings.bag import Bag
 from ddagr_gym.recordings.channels import COMMANDS
 from ddagr_gym.recordings.files import Limits, sha256_of
 from ddagr_gym.recordings.frames import mounting_frames, static_frames, transforms
 from ddagr_gym.recordings.message_fields import header_stamp
-from ddagr_gym.recordings.ros_messages import Extractor, extractor
+from ddagr_gym.recordings.ros_messages import BankSpeeds, Extractor, extractor
 from ddagr_gym.recordings.schema import FloatArray, Recording, RobotGeometry
 from ddagr_gym.recordings.topic_map import TRANSFORMS, Topic, TopicMap, TopicSource, choose_topics
 
@@ -31,12 +34,14 @@ class Samples:
     Attributes:
         extract: takes channels out of a message.
         t: stamps [s].
-        values: channels, each as long as ``t``.
+        received: times of receipt [s], as long as ``t``.
+        values: channels, each as long as ``t``; NaN where a message has none of it.
         stamped: number of samples with a header stamp; the others stand at their receipt.
     """
 
     extract: Extractor
     t: array[float] = field(default_factory=lambda: array("d"))
+    received: array[float] = field(default_factory=lambda: array("d"))
     values: dict[str, array[float]] = field(default_factory=dict)
     stamped: int = 0
 
@@ -47,9 +52,28 @@ class Samples:
             return
         stamp = header_stamp(message) if header_stamps else None
         self.stamped += stamp is not None
+        for name in sample:
+            if name not in self.values:
+                self.values[name] = array("d", [math.nan]) * len(self.t)
         self.t.append(receive if stamp is None else stamp)
-        for name, value in sample.items():
-            self.values.setdefault(name, array("d")).append(value)
+        self.received.append(receive)
+        for name, column in self.values.items():
+            column.append(sample.get(name, math.nan))
+
+    def step_back(self) -> StepBack | None:
+        """Where the stamps go back in mid-drive."""
+        return step_back(np.array(self.t), np.array(self.received))
+
+    def only(self, rows: npt.NDArray[np.bool_], values: Mapping[str, FloatArray]) -> Samples:
+        """Some of the samples, with other channels.
+
+        Args:
+            rows: which (n,).
+            values: channels (n,) by name.
+        """
+        t, received = (array("d", np.array(times)[rows]) for times in (self.t, self.received))
+        channels = {name: array("d", column[rows]) for name, column in values.items()}
+        return Samples(self.extract, t, received, channels, len(t) if self.stamped else 0)
 
     def stream(self) -> Stream:
         """What was taken so far."""
@@ -149,7 +173,8 @@ def assemble(
         limits: on the number of rows.
 
     Raises:
-        InputError: no sample in the role that gives the time base, or stamps of two kinds in one topic.
+        InputError: no sample in the role that gives the time base, stamps of two kinds in one topic, stamps that go
+            back, a JointState without the wheels, or a role whose stamps lie where no rows are.
     """
     return _Assembly(path, topic_map, chosen, samples, limits).recording(geometry)
 
@@ -166,8 +191,9 @@ class _Assembly:
         streams = {role: self._stream(role) for role in self.samples}
         base, period = self._base(streams)
         channels, lost = align(base, streams, self.map.tolerance * period)
+        self._refuse_elsewhere(base, streams, lost)
         columns = {"t": base, **{n: v * self.map.signs.get(n, 1.0) for n, v in channels.items()}}
-        have_commands = all(name in channels for name in COMMANDS)
+        have_commands = all(name in channels and np.isfinite(channels[name]).any() for name in COMMANDS)
         recording = Recording.from_columns(
             columns,
             geometry,
@@ -178,14 +204,32 @@ class _Assembly:
         return replace(recording, meta=replace(recording.meta, column_map=self.map.name))
 
     def _stream(self, role: str) -> Stream:
-        samples = self.samples[role]
+        samples, place = self.samples[role], f"{self.path.name}, {self.chosen[role].name}"
+        complaint = samples.extract.complaint() if isinstance(samples.extract, BankSpeeds) else ""
+        if complaint and not samples.t:
+            raise InputError(f"{place}: {complaint}")
         # Receive times and header stamps may come from two clocks: never mix them inside one stream.
         if 0 < samples.stamped < len(samples.t):
             raise InputError(
-                f"{self.path.name}, {self.chosen[role].name}: only {samples.stamped} of {len(samples.t)} messages "
-                "have a header stamp; set stamps: receive in the topic map."
+                f"{place}: only {samples.stamped} of {len(samples.t)} messages have a header stamp; set stamps: "
+                "receive in the topic map."
             )
-        return samples.stream()
+        step = samples.step_back()
+        if step is not None:
+            raise step.refusal(place)
+        return _measured(samples.stream()) if role == "pose" else samples.stream()
+
+    def _refuse_elsewhere(self, base: FloatArray, streams: Mapping[str, Stream], lost: Mapping[str, int]) -> None:
+        """Refuse a role whose samples, several, all lie where no rows are: by another clock, or not in this drive."""
+        for role, stream in streams.items():
+            if not 1 < len(stream.t) == lost[role]:
+                continue
+            receive = "set stamps: receive in the topic map, or " if self.map.stamps == "header" else ""
+            raise InputError(
+                f"{self.path.name}, {self.chosen[role].name}: none of its {len(stream.t)} messages is near a row, its "
+                f"stamps are {stream.t.min():.3f} to {stream.t.max():.3f} s and the rows' {base[0]:.3f} to "
+                f"{base[-1]:.3f} s: {receive}leave {role} out of the map."
+            )
 
     def _base(self, streams: dict[str, Stream]) -> tuple[FloatArray, float]:
         base = streams[self.map.base].sorted().t if self.map.base in streams else np.empty(0)
@@ -217,6 +261,13 @@ class _Assembly:
         for name, sign in self.map.signs.items():
             if sign < 0:
                 yield f"{name} was multiplied by -1."
+
+
+def _measured(pose: Stream) -> Stream:
+    """Pose without roll and pitch where both are exactly 0 throughout: planar odometry measures neither."""
+    planar = {name: v for name, v in pose.channels.items() if name in ("roll", "pitch") and not np.nan_to_num(v).any()}
+    kept = {name: v for name, v in pose.channels.items() if name not in planar}
+    return Stream(pose.t, kept) if len(planar) == 2 else pose
 
 
 def _frame_notes(source: TopicSource, topic: Topic) -> Iterable[str]:

@@ -1,8 +1,10 @@
 from __future__ import annotations
 
 import math
+import re
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -10,7 +12,16 @@ from hypothesis import strategies as st
 from ddagr_gym.errors import InputError
 from ddagr_gym.recordings.frames import FrameTree
 from ddagr_gym.recordings.message_fields import header_stamp
-from ddagr_gym.recordings.ros_messages import extractor, imu, joint_state, metres_from, nav_sat_fix, pose
+from ddagr_gym.recordings.ros_messages import (
+    MOST_JOINTS,
+    BankSpeeds,
+    extractor,
+    imu,
+    joint_speeds,
+    metres_from,
+    nav_sat_fix,
+    pose,
+)
 from ddagr_gym.recordings.topic_map import TopicSource
 
 
@@ -74,21 +85,74 @@ def test_bank_speeds_are_means_over_matching_joints():
         "name": ["front_left_wheel", "Front_RIGHT_wheel", "rear_left_wheel", "rear_right_wheel", "arm"],
         "velocity": [1.0, 2.0, 3.0, 5.0, 99.0],
     }
-    assert joint_state(TopicSource())(message) == {"encoder_right": 3.5, "encoder_left": 2.0}
-    only_front = joint_state(TopicSource(right=("front_right*",), left=("front_left*",)))(message)
+    assert BankSpeeds(TopicSource())(message) == {"encoder_right": 3.5, "encoder_left": 2.0}
+    only_front = BankSpeeds(TopicSource(right=("front_right*",), left=("front_left*",)))(message)
     assert only_front == {"encoder_right": 2.0, "encoder_left": 1.0}
 
 
 @pytest.mark.parametrize(
     ("message", "words"),
     [
-        ({"name": ["a", "b"], "velocity": []}, "0 speeds"),
-        ({"name": ["a"], "velocity": [1.0]}, "matches the right bank"),
+        ({"name": ["a", "b"], "velocity": []}, "none of 1 messages has a speed for each of its joints"),
+        ({"name": [], "velocity": []}, "none of 1 messages has a speed"),
+        ({"name": "left", "velocity": 3.0}, "none of 1 messages has a speed"),
+        (
+            {"name": ["a"], "velocity": [1.0]},
+            r"no joint of a matches the right bank's patterns \*right\*: give",
+        ),
+        ({"name": ["my_right"], "velocity": [1.0]}, "no joint of my_right matches the left bank's patterns"),
     ],
 )
-def test_joint_states_without_wheels_are_refused(message, words):
-    with pytest.raises(InputError, match=words):
-        joint_state(TopicSource())(message)
+def test_joint_states_without_wheels_are_no_samples_and_say_why(message, words):
+    take = BankSpeeds(TopicSource())
+    assert take.complaint() == ""
+    assert take(message) is None
+    assert re.search(words, take.complaint())
+
+
+def test_banks_that_never_come_in_one_message_are_complained_of():
+    take = BankSpeeds(TopicSource())
+    assert take({"name": ["left"], "velocity": [1.0]}) is None
+    assert take({"name": ["right"], "velocity": [1.0]}) is None
+    assert "joints of both banks (left, right): publish right and left wheels in one JointState" in take.complaint()
+
+
+def test_speeds_that_are_null_or_no_mean_are_not_known():
+    message = {"name": ["left", "front_right", "rear_right"], "velocity": [None, math.inf, -math.inf]}
+    sample = BankSpeeds(TopicSource())(message)
+    assert all(math.isnan(sample[name]) for name in ("encoder_left", "encoder_right"))
+    assert math.isnan(joint_speeds()(message)["left"])
+
+
+def test_single_joints_go_by_name_in_any_order():
+    take = joint_speeds()
+    assert take({"name": ["a", "b"], "velocity": [1.0, 2.0]}) == {"a": 1.0, "b": 2.0}
+    assert take({"name": ["b", "a"], "velocity": [2.0, 1.0]}) == {"a": 1.0, "b": 2.0}
+    assert take({"name": [], "velocity": []}) is None
+    many = [f"joint_{k}" for k in range(2 * MOST_JOINTS)]
+    assert len(take({"name": many, "velocity": [0.0] * len(many)})) == MOST_JOINTS - 2
+
+
+@pytest.mark.parametrize("field", ["linear_acceleration", "angular_velocity", "orientation"])
+@pytest.mark.parametrize("mounting", [None, np.eye(3)])
+def test_what_an_imu_says_it_does_not_measure_is_not_known(field, mounting):
+    message = {
+        "linear_acceleration": {"x": 1, "y": 2, "z": 3},
+        "angular_velocity": {"x": 0, "y": 0, "z": 4},
+        "orientation": quaternion(0.1, 0.2, 0.3),
+        f"{field}_covariance": [-1.0] + [0.0] * 8,
+    }
+    channels = {
+        "linear_acceleration": {"specific_force_x", "specific_force_y", "specific_force_z"},
+        "angular_velocity": {"yaw_rate"},
+        "orientation": {"roll", "pitch"},
+    }
+    take = imu(TopicSource(orientation=True), None if mounting is None else lambda _: mounting)
+    lacking = {name for name, value in take(message).items() if math.isnan(value)}
+    # A rotation mixes the axes of one vector, never two vectors.
+    assert lacking == channels[field]
+    message[f"{field}_covariance"] = [0.01] + [0.0] * 8
+    assert not any(math.isnan(value) for value in take(message).values())
 
 
 @pytest.mark.parametrize(

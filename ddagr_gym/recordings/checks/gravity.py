@@ -2,7 +2,8 @@
 
 Level ground gives f = (0, 0, 9.8). A slope turns with the heading, a bias or a tilted sensor does not: over rests at
 several headings, ``f_x = s_x cos yaw + s_y sin yaw + b_x`` and ``f_y = -s_x sin yaw + s_y cos yaw + b_y``, separate the
-slope's pull s (world) from the sensor's offset b (body). Absolute roll and pitch, where recorded, give the slope.
+slope's pull s (world) from the sensor's offset b (body). Absolute roll and pitch, where recorded, give the slope; exact
+zeros throughout are those of a planar pose, which measures neither.
 """
 
 from __future__ import annotations
@@ -97,6 +98,7 @@ def _norm(norms: FloatArray) -> CheckFinding:
 
 def _direction(recording: Recording, found: list[Rest]) -> list[CheckFinding]:
     absolute = len(recording.meta.spans) == 1 and all(np.isfinite([r.roll, r.pitch]).all() for r in found)
+    absolute = absolute and bool(np.nan_to_num([recording["roll"], recording["pitch"]]).any())
     if absolute and len(found) >= 2:
         return offset_findings(*offset_by_attitude(found), "against the pose's roll and pitch", len(found))
     by_heading = offset_by_heading(found)

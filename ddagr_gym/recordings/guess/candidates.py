@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import glob
-from array import array
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
@@ -17,7 +16,7 @@ from ddagr_gym.recordings.frames import FrameTree, frame_name, mounting_frames, 
 from ddagr_gym.recordings.guess.names import in_namespace, namespaces
 from ddagr_gym.recordings.message_fields import field_of
 from ddagr_gym.recordings.ros_messages import Extractor, joint_speeds
-from ddagr_gym.recordings.schema import RobotGeometry
+from ddagr_gym.recordings.schema import FloatArray, RobotGeometry
 from ddagr_gym.recordings.streams import Samples, collect, topic_extractor
 from ddagr_gym.recordings.topic_map import ROLE_TYPES, TRANSFORMS, Topic, TopicSource
 
@@ -112,10 +111,10 @@ def contents(bag: Bag, geometry: RobotGeometry | None, limits: Limits, namespace
         for role, kinds in ROLE_TYPES.items()
         for topic in topics
         if topic.message_type in kinds and topic.name in firsts
-        for source in _sources(role, topic, bag, frames, firsts[topic.name])
+        for source in _sources(role, topic, bag, frames)
     ]
     extractors = {
-        number: (topic.name, _extractor(bag, topic, source, geometry or STAND_IN, firsts[topic.name]))
+        number: (topic.name, _extractor(bag, topic, source, geometry or STAND_IN))
         for number, (_, topic, source) in enumerate(readings)
     }
     samples = collect(bag, extractors, True, limits)
@@ -174,7 +173,7 @@ def _first_messages(bag: Bag, topics: Sequence[Topic]) -> dict[str, Any]:
     return found
 
 
-def _sources(role: str, topic: Topic, bag: Bag, frames: dict[str, str], first: Any) -> Iterator[TopicSource]:
+def _sources(role: str, topic: Topic, bag: Bag, frames: dict[str, str]) -> Iterator[TopicSource]:
     """Entries of a topic map that would read the topic in that role."""
     if role == "imu":
         yield TopicSource(topic=topic.name)
@@ -184,7 +183,7 @@ def _sources(role: str, topic: Topic, bag: Bag, frames: dict[str, str], first: A
     elif topic.message_type == TRANSFORMS:
         for parent, child in _poses_in(bag, topic):
             yield TopicSource(topic=topic.name, parent=parent, child=child, optional=True)
-    elif role != "wheels" or field_of(first, "name"):
+    else:
         yield TopicSource(topic=topic.name, optional=role in ("command", "pose"))
 
 
@@ -213,45 +212,76 @@ def _poses_in(bag: Bag, topic: Topic) -> Iterator[tuple[str, str]]:
             yield world, body
 
 
-def _extractor(bag: Bag, topic: Topic, source: TopicSource, geometry: RobotGeometry, first: Any) -> Extractor:
+def _extractor(bag: Bag, topic: Topic, source: TopicSource, geometry: RobotGeometry) -> Extractor:
     if topic.message_type == "JointState":
-        return joint_speeds([str(name) for name in field_of(first, "name")])
+        return joint_speeds()
     return topic_extractor(bag, topic, source, geometry)
 
 
 def _why_not_header(bag: Bag, found: Sequence[tuple[Topic, Samples]]) -> str:
-    """Why header stamps cannot be used; "" where they can."""
-    extents: list[tuple[float, float, str]] = []
+    """Why header stamps cannot be used; "" where they can.
+
+    Raises:
+        InputError: times of receipt cannot be used either.
+    """
     for topic, samples in found:
         if 0 < samples.stamped < len(samples.t):
             return f"{topic.name} has header stamps in {samples.stamped} of {len(samples.t)} messages only"
-        if samples.stamped and len(samples.t) >= 2:
-            extents.append((min(samples.t), max(samples.t), topic.name))
-    if not extents:
+    for topic, samples in found:
+        step = samples.step_back()
+        if step is not None and step.received_too:
+            raise step.refusal(f"{bag.path.name}, {topic.name}")
+        if step is not None:
+            return f"the header stamps of {topic.name} go back by {step.fall:.4g} s"
+    return _by_two_clocks([(topic, samples) for topic, samples in found if len(samples.t) >= 2])
+
+
+def _by_two_clocks(found: Sequence[tuple[Topic, Samples]]) -> str:
+    """Which topics were recorded together and have no stamps in common; "" for none."""
+    if not found:
         return ""
-    longest = max(extents, key=lambda extent: extent[1] - extent[0])
-    for start, stop, name in extents:
-        if stop < longest[0] or start > longest[1]:
-            return f"the header stamps of {name} and {longest[2]} have no time in common"
+    longest, most = max(found, key=lambda pair: max(pair[1].t) - min(pair[1].t))
+    for topic, samples in found:
+        if _meet(samples.received, most.received) and not _meet(samples.t, most.t):
+            return f"{_stamps_of(topic, samples)} and {_stamps_of(longest, most)} have no time in common"
     return ""
 
 
+def _meet(one: Sequence[float], other: Sequence[float]) -> bool:
+    return min(one) <= max(other) and min(other) <= max(one)
+
+
+def _stamps_of(topic: Topic, samples: Samples) -> str:
+    """What places a topic's samples in time, in words."""
+    if samples.stamped:
+        return f"the header stamps of {topic.name}"
+    return f"the times of receipt of {topic.name}, which has no others,"
+
+
 def as_wheels(candidate: Candidate, right: Sequence[str], left: Sequence[str]) -> Candidate:
-    """A candidate for the wheels whose samples are the banks' mean speeds.
+    """A candidate for the wheels whose samples are the banks' mean speeds, of messages that have both.
 
     Args:
         candidate: with speeds of single joints.
         right: joints of the right bank.
         left: likewise.
     """
-    speeds = candidate.samples.values
+    speeds = {name: np.array(values) for name, values in candidate.samples.values.items()}
     banks = {
-        f"encoder_{bank}": np.mean([np.array(speeds[joint]) for joint in joints], axis=0)
-        for bank, joints in (("right", right), ("left", left))
+        "encoder_right": _mean_of_known([speeds[joint] for joint in right]),
+        "encoder_left": _mean_of_known([speeds[joint] for joint in left]),
     }
-    values = {name: array("d", mean) for name, mean in banks.items()}
+    samples = candidate.samples.only(np.isfinite(banks["encoder_right"] + banks["encoder_left"]), banks)
     source = replace(candidate.source, right=tuple(map(_pattern, right)), left=tuple(map(_pattern, left)))
-    return replace(candidate, source=source, samples=replace(candidate.samples, values=values))
+    return replace(candidate, source=source, samples=samples)
+
+
+def _mean_of_known(columns: Sequence[FloatArray]) -> FloatArray:
+    """Mean of those that are known in each row; NaN where none is."""
+    known = np.isfinite(columns)
+    with np.errstate(invalid="ignore"):
+        mean: FloatArray = np.where(known, columns, 0.0).sum(axis=0) / known.sum(axis=0)
+    return mean
 
 
 def _pattern(joint: str) -> str:

@@ -90,9 +90,11 @@ def choose_wheels(trials: Trials) -> Choice:
         if found is None:
             continue
         wheels = as_wheels(candidate, found.right, found.left)
+        if len(wheels.samples.t) < 2:
+            continue
         banks[candidate.label] = found
         merits.append((wheels, _wheel_merit(wheels, found, moves(candidate, found))))
-    none = "no JointState has two or more joints with velocities that could be wheels"
+    none = "no JointState has two or more joints with velocities that could be wheels, in one message"
     choice = best_of("wheels", merits, none)
     if choice.candidate is None:
         return choice

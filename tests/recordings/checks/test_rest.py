@@ -138,6 +138,15 @@ def test_a_slope_alone_is_not_suspicious():
     assert {f.status for f in gravity(stops(ROUND, slope=(1.0, 0.5)))} == {Status.PASS}
 
 
+@pytest.mark.parametrize("planar", [False, True])
+def test_the_exact_zeros_of_a_planar_pose_are_no_attitude(planar):
+    drive = stops((0.5, 0.6, 0.7, 0.6), slope=(1.0, 0.5))
+    level = np.zeros(len(drive)) if planar else np.full(len(drive), 1e-6)
+    drive = Recording.from_columns({**drive.columns(), "roll": level, "pitch": level})
+    suspicious = [f for f in gravity(drive) if f.status is Status.SUSPICIOUS]
+    assert [f.channel for f in suspicious] == ([] if planar else ["specific_force_x"])
+
+
 def test_a_wrong_scale_shows_in_the_size_of_gravity():
     drive = stops(ROUND)
     drive.channels["specific_force_z"][:] *= 1.05

@@ -22,6 +22,7 @@ from tests.recordings.bags import (
     Drive,
     Sent,
     split,
+    stamp,
     transform,
     write,
 )
@@ -262,6 +263,63 @@ def test_stamps_of_two_clocks_are_not_mixed(usual, proposed):
     proposal = proposed(odd)
     assert proposal.topic_map.stamps == "receive"
     assert "no time in common" in " ".join(proposal.ambiguous)
+
+
+def in_simulated_time(messages):
+    """Headers that begin at 12 s; the receipts stay."""
+    for m in messages:
+        nanoseconds = round((m.t + 12.0) * 1e9)
+        header = {"stamp": {"sec": nanoseconds // 10**9, "nanosec": nanoseconds % 10**9}, "frame_id": m.frame}
+        yield m if m.kind == TWIST else replace(m, values={**m.values, "header": header})
+
+
+def test_simulated_time_beside_commands_without_a_header(usual, proposed):
+    proposal = proposed([*in_simulated_time(usual)])
+    assert proposal.topic_map.stamps == "receive"
+    assert topics_of(proposal) == USUAL
+    assert "the wheels follow it 0." in proposal.reasons["command"]
+    (said,) = proposal.ambiguous
+    assert "the times of receipt of /cmd_vel, which has no others," in said
+
+
+def test_a_clock_that_is_set_back_leaves_times_of_receipt(usual, proposed):
+    def stamped(m):
+        back = 5.0 if m.t >= 30.0 and m.kind == IMU else 0.0
+        return replace(m, values={**m.values, "header": {"stamp": stamp(m.t - back), "frame_id": m.frame}})
+
+    proposal = proposed([m if m.kind == TWIST else stamped(m) for m in usual])
+    assert proposal.topic_map.stamps == "receive"
+    assert "the header stamps of /imu/data go back by 4.98 s" in " ".join(proposal.ambiguous)
+
+
+@pytest.mark.parametrize("names", [["arm_1", "arm_2"], []])
+def test_arms_on_the_topic_of_the_wheels(usual, proposed, names):
+    """The very first message is one of the arm's."""
+    arms = [
+        Sent("/joint_states", JOINTS, k / 30, {"name": names, "velocity": [0.1] * len(names)}) for k in range(-1, 1800)
+    ]
+    proposal = proposed([*usual, *arms])
+    assert "left_wheel left by name" in proposal.reasons["wheels"]
+    assert not [finding for finding in proposal.findings if finding.status is Status.SUSPICIOUS]
+
+
+def test_joints_in_changing_order_are_all_taken(usual, proposed):
+    def turned(m):
+        return replace(m, values={name: values[::-1] for name, values in m.values.items()})
+
+    wheels = [m for m in usual if m.kind == JOINTS]
+    proposal = proposed([*without(usual, JOINTS), *(turned(m) if k % 2 else m for k, m in enumerate(wheels))])
+    (row,) = [row for row in proposal.topics if row.name == "/joint_states"]
+    assert row.rate == pytest.approx(25.0, rel=1e-3)
+
+
+def test_wheels_that_never_come_in_one_message_are_none(usual, proposed):
+    def parts(m):
+        for k, name in enumerate(m.values["name"]):
+            yield replace(m, t=m.t + 1e-3 * k, values={"name": [name], "velocity": m.values["velocity"][k : k + 1]})
+
+    proposal = proposed([*without(usual, JOINTS), *(part for m in usual if m.kind == JOINTS for part in parts(m))])
+    assert proposal.missing[0].startswith("no wheels (no JointState")
 
 
 @pytest.mark.parametrize(
