@@ -169,12 +169,25 @@ def _parse(command: commands.Command, words: list[str]) -> Any | None:
 
 
 def _sentence(box: str) -> str:
-    """The words of tyro's boxed complaint: its first paragraph, and the options that it thinks were meant."""
+    """The words of tyro's boxed complaint: what it does not know, else its first paragraph; and what may be meant.
+
+    Of options that are missing their names are enough.
+    """
     plain = re.sub(r"\x1b\[[0-9;]*m", "", box)
     # Drawn or plain, the box is a title (in the frame when drawn) and paragraphs between ruled lines.
     lines = [line.strip(" │") for line in plain.splitlines() if not re.match(" *[╭╰]", line)]
-    paragraphs = [" ".join(p.split()) for p in re.split(r"^[─-]{3,}$", "\n".join(lines), flags=re.MULTILINE)]
+    parts = re.split(r"^[─-]{3,}$", "\n".join(lines), flags=re.MULTILINE)
+    paragraphs = [_names_of_missing(part) or " ".join(part.split()) for part in parts]
     paragraphs = paragraphs if "╭" in plain else paragraphs[1:]
+    paragraphs.sort(key=lambda paragraph: not paragraph.startswith("Unrecognized"))
     meant = [re.findall(r"--[a-z][\w-]*", p) for p in paragraphs if p.startswith("Perhaps you meant")]
     hint = f": did you mean {', '.join(dict.fromkeys(meant[0]))}" if meant and meant[0] else ""
     return paragraphs[0].rstrip(".:") + hint
+
+
+def _names_of_missing(part: str) -> str:
+    """What is missing by a part of tyro's complaint, without the help of it; "" for another part."""
+    first, *others = part.strip().splitlines() or [""]
+    options = [re.fullmatch(r"(?:-\w [A-Z[{].*, )?(--[a-z][\w-]*)(?: [A-Z[{].*)?", line) for line in others]
+    names = [option[1] for option in options if option]
+    return f"{first} {', '.join(names)}" if first.startswith("Missing from") and names else ""

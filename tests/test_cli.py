@@ -149,6 +149,7 @@ def test_option_before_the_command(capsys):
         (("--side", "left", "--count", "1.5"), ("--count", "'1.5'")),
         (("--side", "left", "--spede", "3"), ("--spede", "did you mean --speed")),
         (("--side", "left", "right"), ("right",)),
+        (("--syde", "left"), ("Unrecognized options: --syde",)),
     ],
 )
 def test_bad_options_are_one_sentence_with_the_value(fake_command, capsys, words, fragments):
@@ -170,6 +171,11 @@ def test_bad_options_read_the_same_in_every_encoding(encoding):
     assert done.returncode == 2
     complaint = "Unrecognized options: --worker, 3: did you mean --workers"
     assert done.stderr == f"ddagr: {complaint}; see ddagr evaluate --help.\n"
+
+
+def test_of_missing_options_the_names_are_said(capsys):
+    sentence = refused(capsys, "calibrate", "monday.csv")
+    assert sentence == "ddagr: Missing from ddagr calibrate: --output, --robot; see ddagr calibrate --help.\n"
 
 
 def test_negative_numbers_are_values_not_options(fake_command):

@@ -283,6 +283,11 @@ def _read_diagnosis(folder: Path) -> tuple[Corrected, Diagnosis]:
     place = folder.expanduser()
     place = place.parent if place.is_file() else place
     answer = load(place / "diagnosis.json")
+    if answer.change is not None:
+        raise InputError(
+            f"{place} compares with ordinary drives and holds no corrected simulator: give the recordings themselves "
+            "and --calibration with its folder."
+        )
     for name in ("robot.yaml", "soil.yaml", "effects.yaml"):
         if not (place / name).is_file():
             raise InputError(f"{place} holds no {name}, so that there is no corrected simulator: diagnose again.")

@@ -113,7 +113,8 @@ def next_drive(
     Args:
         diagnosis_or_rivals: result of :func:`ddagr_gym.diagnose`, folder or diagnosis.json of a diagnosis; or a list of
             effects to tell apart, as ``name=size`` texts or objects.
-        robot: nominal: name, YAML file or object; that of the diagnosis by default, ddagr without one.
+        robot: nominal: name, YAML file or object; that of the diagnosis by default, ddagr without one. After a
+            comparison with ordinary drives give both: those of its calibration, or of the data sheet.
         soil: nominal: name, YAML file or object; that of the diagnosis by default, thesis_a1 without one.
         sensors: some of imu, encoders, pose; those of the diagnosis by default, all without one.
         seed: of the sensor noise.
@@ -141,9 +142,10 @@ def next_drive(
     question = _question(diagnosis_or_rivals)
     if isinstance(question, DrivetrainAnswer):
         return NextDriveResult(drivetrain_drive(question))
+    nominal = _nominal(question, robot, soil)
     answer = planned(
-        robot_from(question.robot if robot is None else robot),
-        soil_from(question.soil if soil is None else soil),
+        robot_from(nominal[0]),
+        soil_from(nominal[1]),
         question.rivals,
         sensors=names_of(sensors) or question.sensors,
         seed=seed,
@@ -155,13 +157,27 @@ def next_drive(
 
 @dataclass(frozen=True)
 class _Question:
-    """What is to be told apart, with which sensors, for which robot on which soil, by which diagnosis."""
+    """What is to be told apart, with which sensors, for which robot on which soil, by which diagnosis.
+
+    A comparison with ordinary drives says of neither robot nor soil which it is.
+    """
 
     rivals: list[Effect]
     sensors: tuple[str, ...]
-    robot: RobotLike
-    soil: SoilLike
+    robot: RobotLike | None
+    soil: SoilLike | None
     setting: Setting
+
+
+def _nominal(question: _Question, robot: RobotLike | None, soil: SoilLike | None) -> tuple[RobotLike, SoilLike]:
+    """Robot and soil as given, else those of the question; InputError where neither says."""
+    chosen_robot, chosen_soil = question.robot if robot is None else robot, question.soil if soil is None else soil
+    if chosen_robot is None or chosen_soil is None:
+        raise InputError(
+            "the diagnosis compares with ordinary drives and does not say which simulator to plan a drive with: give "
+            "robot and soil, of a calibration --robot CALIBRATION/robot.yaml --soil CALIBRATION/soil_GROUND.yaml."
+        )
+    return chosen_robot, chosen_soil
 
 
 def _question(given: QuestionLike) -> _Question | DrivetrainAnswer:
@@ -179,9 +195,12 @@ def _question(given: QuestionLike) -> _Question | DrivetrainAnswer:
 
 def _of_diagnosis(diagnosis: Diagnosis, robot: RobotLike, soil: SoilLike) -> _Question | DrivetrainAnswer:
     from ddagr_gym.diagnosis.planning.next_drive import rivals_of_diagnosis, sensors_of_diagnosis, setting_of_diagnosis
+    from ddagr_gym.diagnosis.setting import Setting
 
     if diagnosis.drivetrain is not None:
         return diagnosis.drivetrain
+    if diagnosis.change is not None:
+        return _Question(rivals_of_diagnosis(diagnosis), sensors_of_diagnosis(diagnosis), None, None, Setting())
     setting = setting_of_diagnosis(diagnosis)
     return _Question(rivals_of_diagnosis(diagnosis), sensors_of_diagnosis(diagnosis), robot, soil, setting)
 

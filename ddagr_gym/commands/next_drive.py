@@ -28,8 +28,10 @@ class Arguments:
         diagnosis: folder or diagnosis.json of `ddagr diagnose`.
         rival: effects to tell apart instead, name=size; may be repeated.
         output: JSON file to write.
-        robot: nominal robot; that of the diagnosis by default, ddagr without one.
-        soil: nominal soil; that of the diagnosis by default, thesis_a1 without one.
+        robot: nominal robot; that of the diagnosis by default, ddagr without one. After a comparison with a calibration
+            or with drives before give it: CALIBRATION/robot.yaml.
+        soil: nominal soil; that of the diagnosis by default, thesis_a1 without one. Likewise:
+            CALIBRATION/soil_GROUND.yaml.
         sensors: some of imu, encoders, pose; those of the diagnosis by default.
         seed: random seed of the sensor noise.
         threads: threads of the simulator.

@@ -122,6 +122,13 @@ def test_bad_sources_are_one_sentence(given, complaint):
         ddagr_gym.adapt(**given)
 
 
+def test_a_comparison_is_told_apart_from_a_diagnosis(diagnosis, monkeypatch):
+    answer = replace(ANSWER, change=SimpleNamespace())
+    monkeypatch.setattr("ddagr_gym.diagnosis.result.files.load", lambda _: answer)
+    with pytest.raises(InputError, match=r"compares with ordinary drives.*give the recordings themselves"):
+        ddagr_gym.adapt(diagnosis=diagnosis())
+
+
 def test_a_diagnosis_without_a_simulator_is_refused(diagnosis):
     folder = diagnosis()
     (folder / "robot.yaml").unlink()

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import asdict, replace
+from types import SimpleNamespace
 
 import pytest
 
@@ -85,4 +86,11 @@ def test_a_diagnosis_knows_its_robot_and_soil(tmp_path, monkeypatch, capsys):
     options = Options(6.0, 6.0, 0.1, asdict(NuisancePriors()), robot_file=str(own))
     save(replace(found, robot="mine", options=options), tmp_path / "diagnosis.json")
     assert main(["next-drive", str(tmp_path)]) == 0
+    assert planned[-1][0] == "mine"
+    # a comparison with ordinary drives has no simulator of its own
+    changed = replace(found, change=SimpleNamespace(), options=Options(window=6.0, robot_file="calibration"))
+    monkeypatch.setattr("ddagr_gym.diagnosis.result.files.load", lambda _: changed)
+    assert main(["next-drive", str(tmp_path)]) == 2
+    assert "give robot and soil, of a calibration --robot CALIBRATION/robot.yaml" in capsys.readouterr().err
+    assert main(["next-drive", str(tmp_path), "--robot", str(own), "--soil", "firm_ground"]) == 0
     assert planned[-1][0] == "mine"
