@@ -28,6 +28,7 @@ from ddagr_gym.evaluation.controllers import (
 from ddagr_gym.evaluation.dataset import IDENTITY, EpisodeDataset, Key, episode_key
 from ddagr_gym.evaluation.estimator_metrics import estimator_errors
 from ddagr_gym.evaluation.metrics import turn_metrics
+from ddagr_gym.evaluation.policy_seeds import one_arm_each
 from ddagr_gym.evaluation.runs import TurnRun, drive_turn, drive_turns
 from ddagr_gym.evaluation.scenarios import Scenario, load_scenarios, set_hash
 from ddagr_gym.parameters import Sensors
@@ -246,13 +247,14 @@ def run_campaign(
         progress: called with the number of episodes that a task added, those of the bounds included.
 
     Raises:
-        InputError: episodes failed, all of them by bad input; the others are driven first. Or the dataset is not
-            readable.
+        InputError: two controllers are one seed of one arm. Or episodes failed, all of them by bad input; the others
+            are driven first. Or the dataset is not readable.
         FailedTasksError: episodes failed; the others are driven first.
 
     Returns:
         The rows of ``controllers`` with ``feasible``, ordered by controller, set and number.
     """
+    one_arm_each(controllers)
     everyone = with_bounds(controllers)
     wanted = set(wanted_episodes(everyone, sets, count))
     dataset = EpisodeDataset(folder, folder.parent / EARLIER)
@@ -281,7 +283,13 @@ def _judged(rows: Sequence[dict[str, Any]], controllers: Sequence[str], sets: Se
     made = {(row["set"], row["number"]) for row in rows if row["controller"] in BOUNDS and row["success"]}
     order = {name: k for k, name in enumerate(controllers)}
     place = {name: k for k, name in enumerate(sets)}
-    mine = [row | {"feasible": (row["set"], row["number"]) in made} for row in rows if row["controller"] in order]
+    # arms by their present names: an earlier version may have stored others
+    arms = {name: dict(zip(("arm", "run"), controller_arm(name), strict=True)) for name in controllers}
+    mine = [
+        row | arms[row["controller"]] | {"feasible": (row["set"], row["number"]) in made}
+        for row in rows
+        if row["controller"] in order
+    ]
     return sorted(mine, key=lambda row: (order[row["controller"]], place[row["set"]], row["number"]))
 
 

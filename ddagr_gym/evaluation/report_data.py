@@ -211,5 +211,5 @@ def replay_name(row: Row) -> str:
 
 
 def display_name(arm: str) -> str:
-    """An arm's name short enough for an axis: a policy's path shrinks to its last part."""
-    return arm.rsplit("/", 1)[-1]
+    """An arm's name short enough for an axis: of a path its last folder and name are left."""
+    return "/".join(arm.split("/")[-2:])

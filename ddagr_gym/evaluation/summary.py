@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.errors import InputError
+from ddagr_gym.evaluation.policy_seeds import same_seed
 from ddagr_gym.evaluation.report_data import arm_name, size_of
 from ddagr_gym.evaluation.statistics import (
     Interval,
@@ -99,7 +100,9 @@ class _Table:
     def __init__(self, rows: Rows) -> None:
         by_run: dict[Any, dict[int, dict[str, Any]]] = {}
         for row in rows:
-            by_run.setdefault(row.get("run", 0), {})[row["number"]] = row
+            other = by_run.setdefault(row.get("run", 0), {}).setdefault(row["number"], row)
+            if other["controller"] != row["controller"]:
+                raise same_seed(other["controller"], row["controller"], arm_name(row), row.get("run", 0))
         self.numbers = sorted(set.intersection(*(set(run) for run in by_run.values())))
         dropped = sum(len(run) for run in by_run.values()) - len(by_run) * len(self.numbers)
         if dropped:

@@ -8,6 +8,7 @@ from pathlib import Path
 from ddagr_gym.errors import InputError, unknown_name
 from ddagr_gym.files import shipped_folder
 from ddagr_gym.policies.archive import Policy, load_policy
+from ddagr_gym.recordings.files import sha256_of
 
 SUFFIX, SEPARATOR = ".npz", "@"
 """Of policies' files, and between a policy's name and the estimate that it receives."""
@@ -61,7 +62,12 @@ def split_estimate(name: str) -> tuple[str, str]:
     return stem, estimate
 
 
-@lru_cache(maxsize=32)
 def find_policy(name: str) -> Policy:
-    """A trained policy by name or path."""
-    return load_policy(policy_file(name))
+    """A trained policy by name or path, read again once its file has changed."""
+    file = policy_file(name)
+    return _load(file.resolve(), sha256_of(file))
+
+
+@lru_cache(maxsize=32)
+def _load(file: Path, version: str) -> Policy:
+    return load_policy(file)

@@ -1,10 +1,12 @@
 """Arm and seed from policy names, with substitutes for trained policies."""
 
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
-from ddagr_gym.evaluation.policy_seeds import arm_and_seed, policy_version
+from ddagr_gym.errors import InputError
+from ddagr_gym.evaluation.policy_seeds import arm_and_seed, one_arm_each, policy_version
 from ddagr_gym.policies import shipped
 
 
@@ -27,8 +29,11 @@ def policy(monkeypatch, tmp_path):
         ("ppo_ekf", "ppo_ekf"),
         ("ppo_ekf_13", "ppo_ekf_13"),
         ("ppo_ekf_4", "ppo_ekf_4"),
-        ("runs/ppo_ekf_seed_3/policy.npz", "ppo_ekf"),
-        ("runs/ppo_raw_3.npz", "ppo_raw"),
+        ("runs/ppo_ekf/seed_3/policy.npz", "runs/ppo_ekf"),
+        ("runs/ppo_ekf_seed_3/policy.npz", "runs/ppo_ekf"),
+        ("other/ppo_ekf/seed_3/policy.npz", "other/ppo_ekf"),
+        ("runs/ppo_raw_3.npz", "runs/ppo_raw"),
+        ("runs/mine/policy.npz", "runs/mine"),
         ("ppo_ekf_seed_3@frozen", "ppo_ekf@frozen"),
     ],
 )
@@ -42,3 +47,14 @@ def test_version_changes_with_file_and_estimate(policy):
     assert policy_version("ppo_ekf") == first
     policy.write_bytes(b"other weights")
     assert policy_version("ppo_ekf") != first
+
+
+def test_a_policy_in_the_present_folder_is_no_published_one(policy):
+    assert arm_and_seed("ppo_ekf_3.npz") == (str(Path("ppo_ekf").absolute()), 3)
+
+
+def test_two_policies_that_are_one_seed_of_one_arm_are_refused_before_they_drive(policy):
+    both = ["runs/a/seed_3/policy.npz", "runs/a_3.npz"]
+    with pytest.raises(InputError, match="training seed 3 of 'runs/a'"):
+        one_arm_each(both)
+    one_arm_each(["B1", "ppo_ekf_seed_3", "runs/ppo_ekf/seed_3/policy.npz", "runs/ppo_raw/seed_3/policy.npz"])

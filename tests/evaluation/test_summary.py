@@ -120,3 +120,10 @@ def test_seeds_must_have_driven_the_same_scenarios():
     rows = rows_of("ppo", [0.01, 0.02], run=1) + rows_of("ppo", [0.01], run=2)
     with pytest.raises(InputError, match="lacks 1 episodes"):
         summaries(rows)
+
+
+def test_two_controllers_that_are_one_seed_of_one_arm_are_refused():
+    twins = rows_of("ppo", [0.01, 0.02], run=1)
+    other = [row | {"controller": "elsewhere/seed_1/policy.npz"} for row in twins]
+    with pytest.raises(InputError, match=r"'ppo_1' and 'elsewhere/seed_1/policy.npz' are both training seed 1"):
+        summaries([*twins, *other])

@@ -59,9 +59,7 @@ def folder(tmp_path, monkeypatch):
     }.items():
         save_policy(make_policy(design), tmp_path / name / "policy.npz")
     monkeypatch.setattr(shipped, "policies_dir", lambda: tmp_path)
-    shipped.find_policy.cache_clear()
-    yield tmp_path
-    shipped.find_policy.cache_clear()
+    return tmp_path
 
 
 @pytest.fixture(scope="module")
@@ -100,6 +98,14 @@ def test_names(folder):
     path = str(folder / "ppo_raw" / "policy.npz")
     assert policy_controller(path).policy.design == PolicyDesign(features="raw")
     assert "@" not in policy_controller(f"{folder / 'ppo_ekf' / 'policy.npz'}@frozen").policy.training["digest"]
+
+
+def test_a_file_that_was_trained_anew_is_read_anew(tmp_path):
+    file = save_policy(make_policy(PolicyDesign()), tmp_path / "policy.npz")
+    first = shipped.find_policy(str(file))
+    assert shipped.find_policy(str(file)) is first
+    save_policy(replace(make_policy(PolicyDesign()), training={**first.training, "seed": 7}), file)
+    assert shipped.find_policy(str(file)).training["seed"] == 7
 
 
 def test_titles_tell_the_arms_apart(folder):
