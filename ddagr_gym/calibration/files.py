@@ -87,6 +87,21 @@ def load_slope(folder: Path, ground: str) -> tuple[Slope, ...]:
     return tuple(Slope.of_gradient(*item.gradient) for item in load(folder).slopes if item.ground == ground)
 
 
+def ground_to_add(folder: Path, ground: str) -> str:
+    """That a ground could be named where a calibration knows a single one and none was named; "" otherwise.
+
+    Args:
+        folder: that ``ddagr calibrate`` wrote.
+        ground: that was named; "" for none.
+    """
+    if ground or not (folder / NAME).is_file():
+        return ""  # what is missing is said by whoever needs it
+    grounds = load(folder).grounds
+    if len(grounds) != 1:
+        return ""
+    return f"the calibration knows one ground: add --ground {grounds[0]} if the drive was on it."
+
+
 def load_soil(folder: Path, ground: str = "") -> tuple[str, Soil]:
     """Calibrated soil of a ground, and the ground.
 

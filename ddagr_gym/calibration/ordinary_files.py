@@ -133,6 +133,7 @@ def _reference(item: Reference) -> dict[str, Any]:
         "soil": None if item.soil is None else dump_config(item.soil),
         "moved": {name: _plain(value) for name, value in item.moved.items()},
         "column_map": item.column_map,
+        "period": _plain(item.period),
         "on_ground": _on_ground(item.on_ground),
     }
 
@@ -150,6 +151,7 @@ def _reference_of(mapping: Mapping[str, Any]) -> Reference:
         {str(name): float(value) for name, value in mapping.get("moved", {}).items()},
         str(mapping.get("column_map", "")),
         on_ground=_on_ground_of(mapping.get("on_ground", {})),
+        period=float(mapping.get("period", 0.0)),
     )
 
 

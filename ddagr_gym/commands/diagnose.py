@@ -24,7 +24,7 @@ def run(arguments: Arguments) -> int | None:
     import ddagr_gym
     from ddagr_gym.api.diagnosis_result import DiagnosisResult
     from ddagr_gym.api.inputs import is_folder_of_drives, recordings_from
-    from ddagr_gym.calibration.files import robot_file
+    from ddagr_gym.calibration.files import ground_to_add, robot_file
     from ddagr_gym.commands.diagnose_drives import run_drives
     from ddagr_gym.diagnosis.store import part_folder
     from ddagr_gym.recordings.files import Limits
@@ -36,6 +36,8 @@ def run(arguments: Arguments) -> int | None:
     need(*(() if arguments.names_only else ("jinja2", "matplotlib")))
     _check_viewer_files(arguments)
     read_as = (arguments.robot or None) if arguments.calibration is None else robot_file(arguments.calibration)
+    if arguments.calibration is not None and (hint := ground_to_add(arguments.calibration, arguments.ground)):
+        print(f"ddagr: {hint}", file=sys.stderr)
     limits = Limits(arguments.maximum_rows, arguments.maximum_bytes)
     parts = part_folder(arguments.output.expanduser().resolve())
     if arguments.calibration is not None and any(map(is_folder_of_drives, arguments.runs)):

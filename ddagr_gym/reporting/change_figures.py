@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from ddagr_gym.diagnosis.answer.change import BEFORE
+from ddagr_gym.diagnosis.result.near_miss import by_distance
 from ddagr_gym.diagnosis.wording import CHANNEL_NAMES, title
 from ddagr_gym.physics.effects.registry import effect_kind
 from ddagr_gym.rendering import palette
@@ -28,7 +29,7 @@ def shift_figure(change: Change, named: tuple[str, ...]) -> Any:
         change: of a drive.
         named: effects of the verdict.
     """
-    shifts = list(reversed(change.shifts))
+    shifts = list(reversed(by_distance(change)))
     figure = blank_figure(1.1 + 0.24 * len(shifts), PAGE_WIDTH)
     left, right = figure.subplots(1, 2, sharey=True, width_ratios=(3.0, 2.0))
     for place, item in enumerate(shifts):
@@ -70,7 +71,7 @@ def size_figure(change: Change, named: tuple[str, ...]) -> Any:
         change: of a drive.
         named: effects of the verdict.
     """
-    rows = [row for item in reversed(change.shifts) for row in _sizes_of(item)]
+    rows = [row for item in reversed(by_distance(change)) for row in _sizes_of(item)]
     figure = blank_figure(1.2 + 0.22 * len(rows), PAGE_WIDTH)
     axes = figure.subplots(1, 2, sharey=True, sharex=True)
     for place, (_, effect, before, after, half) in enumerate(rows):

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ddagr_gym.diagnosis.answer.change import BEFORE
+from ddagr_gym.diagnosis.result.near_miss import few_drives_in_words
 from ddagr_gym.files import write_text
 from ddagr_gym.reporting import change_figures as figures
 from ddagr_gym.reporting import change_text as text
@@ -54,6 +55,8 @@ def _context(diagnosis: Diagnosis) -> dict[str, Any]:
         "before": change.against == BEFORE,
         "certificate": text.certified(diagnosis),
         "slope": text.slope_before(change),
+        "few_drives": few_drives_in_words(change),
+        "first_estimate": text.first_estimate(diagnosis),
         "ground": change.ground,
         "windows": change.windows,
         "usual": "" if change.certificate is None else f"{100.0 * change.certificate.expected:.0f}",

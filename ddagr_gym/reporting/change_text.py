@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from ddagr_gym.diagnosis.answer.amounts import number
 from ddagr_gym.diagnosis.answer.change import BEFORE
+from ddagr_gym.diagnosis.result.near_miss import by_distance, few_drives_in_words
 from ddagr_gym.diagnosis.result.sentences import certificate_in_words
 from ddagr_gym.diagnosis.wording import CHANNEL_NAMES, title
 from ddagr_gym.physics.effects.slope import Slope
@@ -33,6 +34,13 @@ CHANNEL_HEADER = ("readings", "before", "without effects", "with what changed", 
 SHOWN = 8
 """Effects in the text, the most conspicuous (ours); the page has all of them."""
 
+FIRST_ESTIMATE = (
+    "A first estimate of each effect as if it were the only one{fitted}.\n"
+    "Distance: how far its sizes are from those of {drives}, in standard deviations of what makes these differ.\n"
+    "Limit: the distance that an ordinary drive exceeds, for any effect, in {level} % of the cases."
+)
+"""Above the table of all effects."""
+
 
 def change_text(diagnosis: Diagnosis) -> str:
     """Answer, findings, and the most conspicuous effects."""
@@ -40,14 +48,22 @@ def change_text(diagnosis: Diagnosis) -> str:
     parts = [diagnosis.sentence]
     if diagnosis.findings:
         parts.append(format_table(CHANGED_HEADER, changed_rows(diagnosis)))
-    parts += [line for line in (certified(diagnosis), slope_before(change)) if line]
-    rows = [row for item in change.shifts[:SHOWN] for row in _rows(item)]
-    parts.append(format_table(SHIFT_HEADER, rows))
+    parts += [line for line in (certified(diagnosis), slope_before(change), few_drives_in_words(change)) if line]
+    rows = [row for item in by_distance(change)[:SHOWN] for row in _rows(item)]
+    parts.append(f"{first_estimate(diagnosis)}\n\n{format_table(SHIFT_HEADER, rows)}")
     further = len(change.shifts) - SHOWN
     if further > 0:
         parts.append(f"{further} effects more are less conspicuous; the page and diagnosis.json have all of them.")
     parts.append("\n".join(["Not looked for:", *(f"  {line}" for line in not_compared(change))]))
     return "\n\n".join(parts)
+
+
+def first_estimate(diagnosis: Diagnosis) -> str:
+    """What the table of all effects shows, and what its distances and limits are."""
+    change = _of(diagnosis)
+    fitted = "; the answer above fits together what is named" if diagnosis.findings else ""
+    drives = "the drives before" if change.against == BEFORE else "ordinary drives"
+    return FIRST_ESTIMATE.format(fitted=fitted, drives=drives, level=f"{100.0 * change.level:g}")
 
 
 def changed_rows(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
@@ -62,7 +78,7 @@ def _distance_and_limit(finding: Finding) -> AgainstGate:
 
 def shift_rows(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
     """One row per size of every effect, under :data:`SHIFT_HEADER`."""
-    return [row for item in _of(diagnosis).shifts for row in _rows(item)]
+    return [row for item in by_distance(_of(diagnosis)) for row in _rows(item)]
 
 
 def parameter_rows(diagnosis: Diagnosis) -> list[tuple[str, ...]]:

@@ -27,6 +27,9 @@ FINDING_HEADER = ("effect", "size", "90 % interval", "unit", "gain", "gate", "co
 
 FIT_HEADER = ("error on unseen drives", "nominal", "refitted", "corrected", "black box", "ceiling", "unit")
 
+_AS_LIKELY = 0.8
+"""Weight of a rival over that of the name from which it counts as as likely (ours)."""
+
 _SHOWN = ("position", "pose_yaw", "heading_by_gyro", "yaw_rate", "speed", "specific_force_x", "specific_force_y")
 """Channels whose errors are shown, in this order."""
 
@@ -77,15 +80,25 @@ def finding_rows(
 
 def _finding_rows(finding: Finding, evidence: AgainstGate) -> Iterator[tuple[str, ...]]:
     """One row per parameter; what belongs to the whole finding is in the first."""
-    others = [f"{name} {weight:.2f}" for name, weight in finding.equivalence_set.items() if name != finding.name]
     none = "not compared" if finding.by_forecasts else "nothing else" if finding.gate > 0.0 else "seen in the values"
     gated = ("–", "–") if evidence is None else tuple(_number(finding, value) for value in evidence)
-    whole = (*gated, ", ".join(others) or none)
+    whole = (*gated, rivals(finding) or none)
     for number, (name, estimate) in enumerate(shown_parameters(finding).items()):
         interval = "" if estimate.interval is None else f"{estimate.interval[0]:.3g} to {estimate.interval[1]:.3g}"
         first = number == 0
         label = f"{finding.name if first else ''} {name}".strip()
         yield label, f"{estimate.value:.3g}", interval, estimate.unit, *(whole if first else ("", "", ""))
+
+
+def rivals(finding: Finding) -> str:
+    """What a finding could also be, and how likely that is; "" where nothing else is in question."""
+    weights = finding.equivalence_set
+    return ", ".join(_rival(finding, name, weight) for name, weight in weights.items() if name != finding.name)
+
+
+def _rival(finding: Finding, name: str, weight: float) -> str:
+    alike = weight >= _AS_LIKELY * finding.equivalence_set.get(finding.name, 0.0)
+    return f"{name}: {'as likely' if alike else f'less likely ({100.0 * weight:.0f} %)'}"
 
 
 def _number(finding: Finding, value: float) -> str:

@@ -29,7 +29,9 @@ ROBOT, SOIL = get_robot("ddagr"), get_soil("thesis_a1")
 ORDINARY = Ordinary(
     replace(WEIGHING, turning=0.2),
     (
-        Reference("one.csv", "sand", False, scores(), scores(), robot=ROBOT, soil=SOIL, moved={"mass": 1.5}),
+        Reference(
+            "one.csv", "sand", False, scores(), scores(), robot=ROBOT, soil=SOIL, moved={"mass": 1.5}, period=0.025
+        ),
         Reference("two.csv", "sand", False, scores(), scores(), on_ground=RobotOnGround({"a": 0.5}, {"a": 0.25})),
     ),
     {"sand": RobotOnGround({"a": -0.5}, {"a": 0.125})},
@@ -47,6 +49,7 @@ def test_weights_and_scores_read_back(tmp_path):
         np.testing.assert_allclose(getattr(first.known_ground, name), getattr(scores(), name), rtol=1e-8)
     assert (first.robot, first.soil) == (ROBOT, SOIL)
     assert first.moved == {"mass": 1.5}
+    assert (first.period, found.references[1].period) == (0.025, 0.0)
     assert (found.references[1].robot, found.references[1].soil) == (None, None)
     assert found.references[1].on_ground == ORDINARY.references[1].on_ground
     assert found.on_grounds == ORDINARY.on_grounds
@@ -57,9 +60,11 @@ def test_a_bank_of_the_second_version_is_read(tmp_path):
     save_ordinary(ORDINARY, path)
     body = json.loads(path.read_text())
     del body["ordinary"]["on_grounds"], body["ordinary"]["references"][1]["on_ground"]
+    del body["ordinary"]["references"][0]["period"]
     path.write_text(json.dumps({**body, "version": 2, "runs": [{"kind": "real"}]}))
     found = load_ordinary(path)
     assert [item.drive for item in found.references] == ["one.csv", "two.csv"]
+    assert found.references[0].period == 0.0
     assert (found.on_grounds, found.references[1].on_ground) == ({}, RobotOnGround())
 
 

@@ -7,9 +7,10 @@ from dataclasses import replace
 import pytest
 
 from ddagr_gym.diagnosis.answer.verdict import DataSource
-from ddagr_gym.reporting.change_text import changed_rows
+from ddagr_gym.reporting.change_text import change_text, changed_rows
 from ddagr_gym.reporting.diagnosis_tables import tiles
 from ddagr_gym.reporting.parameter_units import unit_in_words
+from tests.diagnosis.result.test_near_miss import CHANGE
 from tests.reporting.made_diagnosis import diagnosis, entries
 
 
@@ -24,7 +25,19 @@ def test_distances_are_those_whose_half_squares_gains_are():
 
 def test_what_is_seen_in_the_values_has_no_distance():
     first = changed_rows(diagnosis(findings=[finding(gain=0.9, gate=0.0)]))[0]
-    assert first[4:] == ("–", "–", "accelerometer_bias 0.20")
+    assert first[4:] == ("–", "–", "accelerometer_bias: less likely (20 %)")
+
+
+def test_a_rival_of_the_same_weight_is_as_likely():
+    even = finding(equivalence_set={"slope": 0.5, "payload": 0.5})
+    assert changed_rows(diagnosis(findings=[even]))[0][-1] == "payload: as likely"
+
+
+def test_the_table_of_all_effects_is_by_distance_over_limit_and_says_what_it_is():
+    told = change_text(replace(diagnosis(), change=CHANGE))
+    assert told.index("Offset centre of mass") < told.index("Gyro bias")
+    assert "A first estimate of each effect as if it were the only one; the answer above fits together" in told
+    assert "only 3 ordinary drives, so that limits are wide" in told
 
 
 @pytest.mark.parametrize(

@@ -116,6 +116,7 @@ class Reference:
         column_map: by which it was read; "" where that is not known.
         misfit: mean square of what the fit leaves of each channel; none in files of calibrations.
         misfit_error: relative standard error of that by the windows.
+        period: between its rows [s]; 0 in files of before.
     """
 
     drive: str
@@ -131,6 +132,7 @@ class Reference:
     misfit: Mapping[str, float] = field(default_factory=dict)
     misfit_error: Mapping[str, float] = field(default_factory=dict)
     on_ground: RobotOnGround = field(default_factory=RobotOnGround)
+    period: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

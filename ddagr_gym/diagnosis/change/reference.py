@@ -138,4 +138,5 @@ def _reference(drive: OrdinaryDrive, scan: DriveScan, other: Priors, losses: Arr
         drive.soil,
         on_ground=drive.on_ground,
         column_map=drive.recording.meta.column_map,
+        period=drive.recording.period,
     )

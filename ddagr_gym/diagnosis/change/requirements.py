@@ -25,8 +25,8 @@ def check_comparable(recordings: Sequence[Recording], ordinary: OrdinaryRobot, g
         ground: that they are said to be on; "" where it is not known.
 
     Raises:
-        InputError: a drive of another robot, a ground that the calibration does not have, a missing channel, and what
-            no diagnosis takes.
+        InputError: a drive of another robot or rate, a ground that the calibration does not have, a missing channel,
+            and what no diagnosis takes.
     """
     if ground and ground not in ordinary.soils:
         raise InputError(
@@ -39,6 +39,7 @@ def check_comparable(recordings: Sequence[Recording], ordinary: OrdinaryRobot, g
                 f"{recording.meta.source} is a drive of the robot {recording.meta.robot!r} and the calibration is of "
                 f"{ordinary.robot.name!r}: compare it with ordinary drives of its own robot."
             )
+    _check_rate(recordings, ordinary)
     _check_channels(recordings)
     check_recordings(recordings, ordinary.robot, Setting().with_windows(ordinary.weighing.window))
 
@@ -64,17 +65,29 @@ def check_before(after: Sequence[Recording], before: Sequence[Recording], robot:
                 f"{recording.meta.source} is a drive of the robot {recording.meta.robot!r}, compared with --robot "
                 f"{robot.name}: give drives of one robot, and its name."
             )
-    first, later = before[0], after[0]
-    if abs(later.period - first.period) > PERIOD_TOLERANCE * first.period:
-        raise InputError(
-            f"{later.meta.source} has {1.0 / later.period:.3g} Hz and {first.meta.source} from before "
-            f"{1.0 / first.period:.3g} Hz: compare drives of one rate (a topic map with `rate: 50` reads a bag at 50 "
-            "Hz; resample CSV files before the import)."
-        )
+    _check_same_rate(after[0], before[0].period, f"{before[0].meta.source} from before")
     _check_apart(after, before)
     _check_channels((*before, *after))
     for drives in (before, after):
         check_recordings(drives, robot, Setting().with_windows(window))
+
+
+def _check_rate(recordings: Sequence[Recording], ordinary: OrdinaryRobot) -> None:
+    """Refuse drives of another rate than the ordinary ones', as far as the calibration says theirs."""
+    known = next((item for item in ordinary.references if item.period > 0.0), None)
+    if known is not None:
+        for recording in recordings:
+            _check_same_rate(recording, known.period, f"{known.drive} of the calibration")
+
+
+def _check_same_rate(recording: Recording, period: float, other: str) -> None:
+    """Refuse a drive whose rows are not as far apart [s] as those of another one."""
+    if abs(recording.period - period) > PERIOD_TOLERANCE * period:
+        raise InputError(
+            f"{recording.meta.source} has {1.0 / recording.period:.3g} Hz and {other} {1.0 / period:.3g} Hz: compare "
+            "drives of one rate (a topic map with `rate: 50` reads a bag at 50 Hz; resample CSV files before the "
+            "import)."
+        )
 
 
 def _check_apart(after: Sequence[Recording], before: Sequence[Recording]) -> None:

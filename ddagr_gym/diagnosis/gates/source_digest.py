@@ -28,6 +28,7 @@ _FILES = (
 _PROSE = (
     "diagnosis/answer/amounts.py",
     "diagnosis/wording.py",
+    "diagnosis/result/near_miss.py",
     "diagnosis/result/sentences.py",
     "diagnosis/series/sentences.py",
 )

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from ddagr_gym.diagnosis.answer.change import BEFORE, Change, ChangeCertificate
 from ddagr_gym.diagnosis.answer.onset import BEGINS, CONSTANT, ENDS, Onset
 from ddagr_gym.diagnosis.answer.verdict import NONE, UNKNOWN, Finding
+from ddagr_gym.diagnosis.result.near_miss import nearest_in_words
 from ddagr_gym.diagnosis.result.soil_words import finding_in_words
 from ddagr_gym.diagnosis.wording import CHANNEL_NAMES, in_sentence
 
@@ -77,9 +78,11 @@ def change_headline(verdict: Sequence[str], complete: bool, findings: Sequence[F
     blind = f"; of {_joined_names(hidden)} no size would have been told" if hidden else ""
     ground = _soil_unnamed(change)
     if tuple(verdict) == (NONE,):
+        power = f"{100.0 * change.power:.0f} times in 100"
+        shown = f"the table says of each effect which change would have been found {power}"
         return (
-            f"Nothing changed against {drives} that this drive could show: what it would have shown "
-            f"{100.0 * change.power:.0f} times in 100 stands beside each effect{blind}{ground}."
+            f"This drive shows no change against {drives}.{nearest_in_words(change)} Smaller changes may be there: "
+            f"{shown}{blind}{ground}."
         )
     if tuple(verdict) == (UNKNOWN,):
         nearest = _joined_names([in_sentence(item.effect) for item in change.shifts[:3]])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 
 from ddagr_gym.diagnosis.change.expected_scatter import EXPECTED_DRIVES
 from ddagr_gym.diagnosis.change.ordinary import OrdinaryRobot, Reference, Scores, field_deviations
+from ddagr_gym.diagnosis.change.requirements import check_comparable
 from ddagr_gym.diagnosis.change.robot_on_ground import RobotOnGround
 from ddagr_gym.diagnosis.change.weighing import SLOPE_ON_A_GROUND, SensorBias, Weighing
 from ddagr_gym.errors import InputError
@@ -134,3 +136,22 @@ def test_effects_that_came_after_a_calibration_are_not_compared(robot):
     assert set(effect_kinds()) - set(unnamed) == {"gyro_bias", "slope"}
     assert "calibrate again" in unnamed["command_gain"]
     assert "poses are in one frame" in unnamed["soil_patch"]
+
+
+def test_a_drive_of_another_rate_than_the_ordinary_ones_is_refused(robot):
+    """Recordings here have 20 Hz; calibrations of before do not say theirs."""
+    with pytest.raises(
+        InputError, match=r"b\.csv has 20 Hz and a of the calibration 40 Hz: compare drives of one rate"
+    ):
+        check_comparable([asked("b.csv")], of_rate(robot, 40.0), "sand")
+    for rate in (20.0, math.inf):
+        with pytest.raises(InputError, match="has no command_right"):
+            check_comparable([asked("b.csv")], of_rate(robot, rate), "sand")
+
+
+def asked(source: str) -> Recording:
+    return recording("").with_meta(source=source)
+
+
+def of_rate(robot: OrdinaryRobot, rate: float) -> OrdinaryRobot:
+    return replace(robot, references=tuple(replace(item, period=1.0 / rate) for item in robot.references))

@@ -1,0 +1,64 @@
+"""What a comparison with ordinary drives came near to, and how far so few of them can see: the words beside `none`."""
+
+from __future__ import annotations
+
+from ddagr_gym.diagnosis.answer.amounts import Amount, size
+from ddagr_gym.diagnosis.answer.change import CALIBRATION, Change, EffectShift
+from ddagr_gym.diagnosis.wording import in_sentence
+
+NEAR = 0.5
+"""Share of its limit from which the nearest effect is said (ours)."""
+
+FEW_DRIVES = 5
+"""Ordinary drives below which limits are said to be wide (ours): with three they are twice those of many."""
+
+
+def by_distance(change: Change) -> list[EffectShift]:
+    """Shifts of all effects, the largest distance over its limit first."""
+    return sorted(change.shifts, key=over_limit, reverse=True)
+
+
+def nearest(change: Change) -> EffectShift | None:
+    """The effect that stands nearest to its limit; None where none is beyond :data:`NEAR` of it."""
+    return next((item for item in by_distance(change) if over_limit(item) > NEAR), None)
+
+
+def over_limit(item: EffectShift) -> float:
+    """Distance of an effect from ordinary drives, over its limit [-]."""
+    return item.distance / item.limit
+
+
+def nearest_in_words(change: Change) -> str:
+    """A sentence on the effect that stands nearest to its limit, and on what would tell; "" where none is near."""
+    found = nearest(change)
+    if found is None:
+        return ""
+    further = (
+        "further ordinary drives, or --before with the drives themselves, may tell"
+        if change.against == CALIBRATION
+        else "further drives from before may tell"
+    )
+    share = f"{100.0 * over_limit(found):.0f} % of its limit"
+    return f" The nearest is {in_sentence(found.effect)}{_shift_in_words(found)}, at {share}: {further}."
+
+
+def _shift_in_words(item: EffectShift) -> str:
+    """The size of an effect that moved most for what is known of it, in brackets; "" where none has a shift."""
+    known = {name: found for name, found in item.sizes.items() if abs(found.value) < float("inf")}
+    if not known:
+        return ""
+    name = max(known, key=lambda key: abs(known[key].value) / known[key].deviation)
+    found = known[name]
+    plus = "+" if found.value > 0.0 else ""
+    return f" ({name.replace('_', ' ')} {plus}{size(Amount(found.value, found.unit))})"
+
+
+def few_drives_in_words(change: Change) -> str:
+    """That limits are wide with so few ordinary drives, and what shows smaller changes; "" where there are enough."""
+    count = len(change.ordinary)
+    if change.against != CALIBRATION or count >= FEW_DRIVES:
+        return ""
+    return (
+        f"The calibration has only {count} ordinary drives, so that limits are wide: a comparison with these drives "
+        "themselves (--before in place of --calibration) may show smaller changes."
+    )
