@@ -94,9 +94,10 @@ def ground_to_add(folder: Path, ground: str) -> str:
         folder: that ``ddagr calibrate`` wrote.
         ground: that was named; "" for none.
     """
-    if ground or not (folder / NAME).is_file():
-        return ""  # what is missing is said by whoever needs it
-    grounds = load(folder).grounds
+    try:
+        grounds = () if ground else load(folder).grounds
+    except InputError:
+        return ""  # whoever needs the calibration says what is wrong with it
     if len(grounds) != 1:
         return ""
     return f"the calibration knows one ground: add --ground {grounds[0]} if the drive was on it."

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ddagr_gym.diagnosis.answer.drive_series import SINGLE
+from ddagr_gym.diagnosis.answer.drive_series import SINGLE, STAYS
 from ddagr_gym.files import write_text
 from ddagr_gym.reporting import drive_series_figures as figures
 from ddagr_gym.reporting import drive_series_text as text
@@ -69,7 +69,7 @@ def _tiles(series: DriveSeries) -> list[tuple[str, str]]:
     answered = [row for row in series.rows if not row.refused]
     minutes = sum(row.minutes or 0.0 for row in answered)
     named = sum(bool(row.findings) for row in answered)
-    changed = next((str(event.drive + 1) for event in series.events if event.kind != SINGLE), "none")
+    changed = next((str(event.drive + 1) for event in series.events if event.kind == STAYS), "none")
     odd = sum(event.kind == SINGLE for event in series.events)
     return [
         (str(len(series.rows)), "drives"),

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import csv
 import io
-import math
 from typing import TYPE_CHECKING
 
-from ddagr_gym.diagnosis.answer.amounts import number
+from ddagr_gym.diagnosis.answer.amounts import amount_of, number, with_interval
 from ddagr_gym.diagnosis.answer.drive_series import LAST, PARAMETER, PASSES, STAYS
 from ddagr_gym.diagnosis.series.sentences import drive_in_words, event_sentence
 from ddagr_gym.diagnosis.wording import in_sentence, title
@@ -15,7 +14,7 @@ from ddagr_gym.reporting.text_table import format_table
 
 if TYPE_CHECKING:
     from ddagr_gym.diagnosis.answer.drive_series import DriveRow, DriveSeries, MovedSize, SeriesEvent, SizeChart
-    from ddagr_gym.diagnosis.answer.verdict import Estimate, Finding
+    from ddagr_gym.diagnosis.answer.verdict import Finding
 
 DRIVE_HEADER = ("no.", "drive", "date (UTC)", "minutes", "answer", "sizes (90 % interval)", "complete")
 """Columns of :func:`drive_rows`."""
@@ -81,13 +80,9 @@ def _named(finding: Finding) -> str:
 def sizes_in_words(finding: Finding) -> str:
     """Sizes of a finding with their intervals; what was not fitted is left out."""
     known = {name: item for name, item in finding.parameters.items() if item.interval is not None}
-    return ", ".join(f"{name.replace('_', ' ')} {_estimate(item)}" for name, item in (known or {}).items())
-
-
-def _estimate(item: Estimate) -> str:
-    unit = "" if item.unit == "-" else f" {item.unit}"
-    low, high = item.interval or (math.nan, math.nan)
-    return f"{number(item.value)}{unit} ({number(low)} to {number(high)})"
+    return ", ".join(
+        f"{name.replace('_', ' ')} {with_interval(amount_of(item))}" for name, item in (known or {}).items()
+    )
 
 
 def event_rows(series: DriveSeries) -> list[tuple[str, ...]]:

@@ -18,6 +18,9 @@ from ddagr_gym.calibration import files
     ],
 )
 def test_the_only_ground_of_a_calibration_is_named_where_none_was(tmp_path, monkeypatch, grounds, named, said):
-    (tmp_path / files.NAME).touch()
     monkeypatch.setattr(files, "load", lambda folder: SimpleNamespace(grounds=grounds))
     assert files.ground_to_add(tmp_path, named) == said
+
+
+def test_nothing_is_said_of_what_is_no_calibration(tmp_path):
+    assert files.ground_to_add(tmp_path, "") == ""

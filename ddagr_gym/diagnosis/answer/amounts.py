@@ -44,10 +44,11 @@ Amounts = Mapping[str, Amount]
 
 def amounts(parameters: Mapping[str, Estimate]) -> dict[str, Amount]:
     """Amounts of a finding's parameters; an interval whose ends are not finite is none."""
-    return {name: _amount(item) for name, item in parameters.items()}
+    return {name: amount_of(item) for name, item in parameters.items()}
 
 
-def _amount(item: Estimate) -> Amount:
+def amount_of(item: Estimate) -> Amount:
+    """An estimate as an amount; an interval whose ends are not finite is none."""
     known = item.interval is not None and all(math.isfinite(end) for end in item.interval)
     return Amount(item.value, item.unit or "-", item.interval if known else None)
 
@@ -82,12 +83,41 @@ def quantity(amount: Amount, unit: str = "", signed: bool = False) -> str:
     half = 0.5 * (high - low)
     if half <= 0.0:
         return f"{plus}{number(value, 3)}{after}"
-    places = max(1 - math.floor(math.log10(half)), 0) if half < 10.0 else 0
-    places = places - 1 if places > 0 and half * 10.0**places >= 20.0 else places
+    places = decimals(half)
     beyond = low > 0.0 >= value - half
     if beyond or abs(value - 0.5 * (low + high)) > _LOPSIDED * half:
         return f"{plus}{fixed(value, places)}{after} ({fixed(low, places)} to {fixed(high, places)})"
     return f"{plus}{fixed(value, places)} ± {fixed(half, places)}{after}"
+
+
+def decimals(half: float) -> int:
+    """Decimals that leave one or two digits of half an interval's width, which is above zero."""
+    places = max(1 - math.floor(math.log10(half)), 0) if half < 10.0 else 0
+    return places - 1 if places > 0 and half * 10.0**places >= 20.0 else places
+
+
+def rounded(amount: Amount) -> str:
+    """A value to the digits that its interval leaves of it, so that a factor near 1 keeps what it differs by."""
+    half = _half_width(amount)
+    return number(amount.value) if half is None else fixed(amount.value, decimals(half))
+
+
+def with_interval(amount: Amount) -> str:
+    """Value, unit and the interval in brackets, as it is where that is known, rounded by its width."""
+    unit = unit_in_words(amount.unit)
+    text = f"{rounded(amount)} {unit}".rstrip()
+    if amount.interval is None:
+        return text
+    low, high = (rounded(Amount(end, interval=amount.interval)) for end in amount.interval)
+    return f"{text} ({low} to {high})"
+
+
+def _half_width(amount: Amount) -> float | None:
+    """Half of an interval's width; None where there is none."""
+    if amount.interval is None:
+        return None
+    half = 0.5 * (amount.interval[1] - amount.interval[0])
+    return half if math.isfinite(amount.value) and math.isfinite(half) and half > 0.0 else None
 
 
 def unit_in_words(unit: str) -> str:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from ddagr_gym.diagnosis.answer.amounts import number
+from ddagr_gym.diagnosis.answer.amounts import amount_of, number, rounded, unit_in_words
 from ddagr_gym.diagnosis.answer.drive_series import (
     BY_TIME,
     LAST,
@@ -25,6 +26,9 @@ from ddagr_gym.diagnosis.wording import in_sentence
 
 MOST_NAMES = 2
 """Effects in a sentence on an event (ours); the page has all of them."""
+
+MOST_OWN_NAMES = 3
+"""Effects that a sentence lists where drives have different names (ours)."""
 
 MOST_LISTED = 10
 """Numbers of drives in a row (ours)."""
@@ -86,18 +90,40 @@ def moved_in_words(item: MovedSize) -> str:
 
 
 def _what(event: SeriesEvent, series: DriveSeries) -> str:
-    """Names that most of the drives have; else the size that moved most."""
+    """Names that most of the drives have; else the drives' own names, or the size that moved most."""
     common = [name for name, count in event.names.items() if 2 * count > event.drives][:MOST_NAMES]
-    if not common:
-        named = "no effect is named in most of these drives" if event.drives > 1 else "no effect is named in it"
-        effects = [item for item in event.moved if item.effect != PARAMETER]
-        return f"{named}; most moves {moved_in_words((effects or event.moved)[0])}"
     rows = _concerned(event, series)
+    if not common:
+        return _without_common_name(event, series, rows)
     first, *others = common
     said = f"{in_sentence(first)}{_size_in_words(first, rows)}"
     if event.drives > 1:
         said += f", named in {event.names[first]} of {event.drives} drives"
     return said + (f", or {in_sentence(others[0])}" if others else "")
+
+
+def _without_common_name(event: SeriesEvent, series: DriveSeries, rows: Sequence[DriveRow]) -> str:
+    """What single drives name where no effect is named in most of them, and the size that moved most where few do."""
+    own = _own_names(series, rows)
+    if 2 * sum(bool(row.findings) for row in rows) > event.drives:
+        return f"its drives have different names, {own}"
+    named = "no effect is named in most of these drives" if event.drives > 1 else "no effect is named in it"
+    effects = [item for item in event.moved if item.effect != PARAMETER]
+    moved = f"{named}; most moves {moved_in_words((effects or event.moved)[0])}"
+    return f"{moved}; named is {own}" if own else moved
+
+
+def _own_names(series: DriveSeries, rows: Sequence[DriveRow]) -> str:
+    """Effects that drives name, each with its drives and its size in these; "" where none does."""
+    names = dict.fromkeys(finding.name for row in rows for finding in row.findings)
+    said = []
+    for name in list(names)[:MOST_OWN_NAMES]:
+        having = [row for row in rows if any(finding.name == name for finding in row.findings)]
+        numbers = [next(k for k, row in enumerate(series.rows, 1) if row is item) for item in having]
+        listed = ", ".join(map(str, numbers[:MOST_LISTED])) + (", ..." if len(numbers) > MOST_LISTED else "")
+        drives = "drives" if len(numbers) > 1 else "drive"
+        said.append(f"{in_sentence(name)}{_size_in_words(name, having)} in {drives} {listed}")
+    return " and ".join([", ".join(said[:-1]), said[-1]] if len(said) > 1 else said)
 
 
 def _concerned(event: SeriesEvent, series: DriveSeries) -> list[DriveRow]:
@@ -114,9 +140,10 @@ def _size_in_words(name: str, rows: Sequence[DriveRow]) -> str:
     # sizes that all drives have come first; of these the one that is stated first
     most = max(fields.values())
     field = next(field for field in fields if fields[field] == most)
-    items = [finding.parameters[field] for finding in found if field in finding.parameters]
-    unit = "" if items[0].unit == "-" else f" {items[0].unit}"
-    return f" ({field.replace('_', ' ')} {number(float(np.median([item.value for item in items])))}{unit})"
+    items = [amount_of(finding.parameters[field]) for finding in found if field in finding.parameters]
+    middle = sorted(items, key=lambda item: item.value)[len(items) // 2]
+    value = replace(middle, value=float(np.median([item.value for item in items])))
+    return f" ({field.replace('_', ' ')} {rounded(value)} {unit_in_words(middle.unit)}".rstrip() + ")"
 
 
 def _nothing(answered: int, series: DriveSeries, odd: bool) -> str:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import pytest
 
-from ddagr_gym.diagnosis.answer.amounts import Amount, amounts, number, quantity
+from ddagr_gym.diagnosis.answer.amounts import Amount, amounts, number, quantity, with_interval
 from ddagr_gym.diagnosis.answer.location import Unevenness
 from ddagr_gym.diagnosis.answer.verdict import Estimate, Finding
 from ddagr_gym.diagnosis.localisation.operating_condition_words import uneven_phrase
@@ -203,3 +203,10 @@ def test_the_headline_names_rivals_that_explain_as_much():
     assert told in sentence
     alone = replace(item, equivalence_set={"slope": 0.85, "imu_tilt": 0.15})
     assert "x axis (less likely tilted IMU); nothing else" in headline(("slope",), True, [alone])
+
+
+def test_a_factor_near_one_keeps_what_it_differs_by():
+    assert with_interval(Amount(1.05, "-", (1.04, 1.06))) == "1.050 (1.040 to 1.060)"
+    assert with_interval(Amount(0.2, "s", (0.16, 0.24))) == "0.20 s (0.16 to 0.24)"
+    assert with_interval(Amount(0.2, "s")) == "0.20 s"
+    assert with_interval(Amount(0.2, "s", (0.2, 0.2))) == "0.20 s (0.20 to 0.20)"

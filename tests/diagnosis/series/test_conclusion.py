@@ -12,7 +12,7 @@ from ddagr_gym.diagnosis.series.change_points import Sizes
 from ddagr_gym.diagnosis.series.conclusion import _is_small, conclude_series, drive_row, in_order, natural
 from ddagr_gym.diagnosis.series.files import load, save
 from ddagr_gym.errors import InputError
-from ddagr_gym.reporting.drive_series_page import write_page
+from ddagr_gym.reporting.drive_series_page import _tiles, write_page
 from ddagr_gym.reporting.drive_series_text import drives_csv, series_text
 from tests.diagnosis.series.made_points import answer
 
@@ -51,6 +51,23 @@ def test_a_change_that_stays_is_said_with_its_first_drive_name_and_size():
 def test_a_change_without_a_name_says_what_moved_most():
     found = series([0.0] * 8 + [9.0] * 8)
     assert "no effect is named in most of these drives; most moves gyro bias (size +9.0)" in found.sentence
+
+
+def test_drives_of_one_event_with_different_names_have_each_their_own():
+    found = series([0.0] * 5 + [14.0] * 2 + [0.0] * 5, [()] * 5 + [("gyro_bias",), ("payload",)])
+    (event,) = found.events
+    assert (event.kind, event.drives) == (PASSES, 2)
+    said = "its drives have different names, gyro bias (bias 0.020 rad/s) in drive 6 and payload (bias 0.020 rad/s) in "
+    assert said + "drive 7." in found.sentence
+    assert "most moves" not in found.sentence
+    few = series([0.0] * 5 + [14.0] * 4 + [0.0] * 5, [()] * 5 + [("gyro_bias",)])
+    assert "most moves gyro bias (size +14); named is gyro bias (bias 0.020 rad/s) in drive 6." in few.sentence
+
+
+def test_only_a_change_that_stays_is_the_first_of_the_tile():
+    label = "first drive of a change that stays"
+    over, stays = series([0.0] * 5 + [14.0] * 5 + [0.0] * 5), series([0.0] * 5 + [14.0] * 5)
+    assert [dict(map(reversed, _tiles(item)))[label] for item in (over, stays)] == ["none", "6"]
 
 
 def test_a_small_change_is_said_to_be_within_ordinary_drives():
