@@ -87,9 +87,8 @@ def select_parts(
         progress: called with a line of text for each part.
     """
     elimination = Elimination(comparison, model, full, cache, progress)
-    for part in PARTS:
-        if model.free & set(part.parameters):
-            elimination.ask(part)
+    for part in elimination.parts:
+        elimination.ask(part)
     elimination.ask_again()
     for name in (RAMP, FILTER):
         elimination.try_delay_for(name)
@@ -111,14 +110,16 @@ class Elimination:
         self._comparison, self._model, self._full = comparison, model, full
         self._cache, self._progress = cache, progress
         self._least = full
+        self.parts = tuple(part for part in PARTS if model.free & set(part.parameters))
         self.best, self.left_out = full, frozenset[str]()
         self.decisions: dict[str, PartDecision] = {}
         self._asked_with: dict[str, frozenset[str]] = {}
 
     def ask(self, part: Part) -> bool:
         """Take a part out unless forecasts miss it; whether it went."""
-        again = ", once more" if part.name in self.decisions else ""
-        self._progress(f"forecasts of left-out drives without {part.title}{again}")
+        again = part.name in self.decisions
+        count = ", once more" if again else f": {self.parts.index(part) + 1} of {len(self.parts)} parts"
+        self._progress(f"forecasts of left-out drives without {part.title}{count}")
         before, out = (self._full, self._least, self.best), self.left_out | {part.name}
         fit = partial(self._fitted_without, out)
         starts = other_starts(part.name, self.best.standing, self._model.robot, self.left_out)

@@ -310,7 +310,7 @@ class Calibration:
         unexplained: where the residuals are.
         converged: whether the joint fit settled.
         seed: of resampled intervals.
-        seconds: that the calibration took.
+        seconds: that this run took, without the steps that an earlier one had finished.
         currents: of the motors; None, and not in the file, where none was used.
         imu: how the IMU is mounted; None where its accelerometer was read in fewer than two drives, or quarters of one.
         slopes: of the grounds that surely slope; the others are taken to be level.

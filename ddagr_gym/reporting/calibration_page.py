@@ -59,9 +59,10 @@ def _context(calibration: Calibration, forecasts: Sequence[Forecasts]) -> dict[s
         "parameter_picture": embedded(
             figures.parameter_figure(found), "Calibrated parameters in standard deviations of the data sheet"
         ),
-        "parameter_header": text.PARAMETER_HEADER[:-1],
-        "parameters": [text.parameter_row(item)[:-1] for item in found],
-        "refused": text.refused_lines(calibration),
+        "parameter_header": text.PARAMETER_HEADER,
+        "parameters": [text.parameter_row(item) for item in found],
+        "refused": [(text.refused_heading(why), lines) for why, lines in text.refused_groups(calibration).items()],
+        "measures": text.MEASURES,
         "part_header": text.PART_HEADER,
         "parts": text.part_rows(calibration),
         "error_picture": embedded(figures.error_figure(calibration), "Errors on left-out drives of all models"),
@@ -141,11 +142,13 @@ def _tiles(calibration: Calibration) -> list[dict[str, str]]:
         share = text.error_share(calibration, metric, horizon)
         if share is not None:
             label = error_words(metric, horizon)
-            found.append({"value": f"{100.0 * share:.0f} %", "label": f"of the data sheet's error left, {label}"})
+            found.append(
+                {"value": f"{100.0 * share:.0f} %", "label": f"of the data sheet's r.m.s. error left, {label}"}
+            )
     seconds = sum(drive.used_seconds for drive in calibration.drives)
     found.append({"value": f"{seconds / 60.0:.0f} min", "label": "of driving fitted"})
     found.append({"value": str(len(calibration.calibrated)), "label": "parameters calibrated, soils included"})
-    found.append({"value": str(len(calibration.refused)), "label": "parameters kept as they were"})
+    found.append({"value": str(len(calibration.refused)), "label": "parameters as in the data sheet"})
     return found
 
 

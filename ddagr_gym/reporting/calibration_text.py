@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from ddagr_gym.calibration.accelerometer_results import ImuMounting, SlopeOfGround
-from ddagr_gym.calibration.parts import PARTS
+from ddagr_gym.calibration.parts import DATA_SHEET_PARTS, PARTS
 from ddagr_gym.calibration.result import (
     CALIBRATED,
     DATA_SHEET,
@@ -19,7 +19,7 @@ from ddagr_gym.calibration.result import (
 from ddagr_gym.physics.effects.slope import Slope
 from ddagr_gym.reporting.text_table import format_table
 
-PARAMETER_HEADER = ("parameter", "unit", "data sheet", "calibrated", "90 %", "between drives", "")
+PARAMETER_HEADER = ("parameter", "unit", "data sheet", "calibrated", "90 %", "between drives")
 """Of :func:`parameter_rows`."""
 
 MODEL_LABELS = {
@@ -32,7 +32,16 @@ MODEL_LABELS = {
 FORECAST_HEADER = ("left-out drive", "soil from", "error", "unit", *(MODEL_LABELS[name] for name in MODELS))
 """Of :func:`forecast_rows`."""
 
-PART_HEADER = ("part", "kept", "forecasts without it are worse by", "standard error")
+AS_STATED = "as in the data sheet"
+"""Of what was not fitted in the end."""
+
+MEASURES = (
+    "Median: of the sizes of the errors, which few large ones do not move; heading and position: root mean square.\n"
+    "The headline has the root mean square of the wheel speeds over all samples, in which large errors count most."
+)
+"""Which measures the table of errors and the headline have."""
+
+PART_HEADER = ("part", "in the model", "forecasts without it are worse by", "standard error")
 """Of :func:`part_rows`."""
 
 MOUNTING_HEADER = ("IMU", "calibrated", "90 %", "unit", "left-out drives are worse without it by", "standard error", "")
@@ -66,7 +75,10 @@ def headline(calibration: Calibration) -> str:
     )
     share = error_share(calibration, "wheel_speed", None)
     return first + (
-        "." if share is None else f"; on left-out drives wheel speeds err by {100.0 * share:.0f} % of before."
+        "."
+        if share is None
+        else "; on left-out drives the root mean square error of the wheel speeds over all samples is "
+        f"{100.0 * share:.0f} % of the data sheet's."
     )
 
 
@@ -86,12 +98,12 @@ def parameter_rows(calibration: Calibration) -> list[tuple[str, ...]]:
 
 
 def parameter_row(item: CalibratedParameter) -> tuple[str, ...]:
-    """One parameter: data sheet, value, interval, scatter between drives, and why it is kept."""
+    """One parameter: data sheet, value, interval, and scatter between drives."""
     sheet = "none" if item.data_sheet is None else f"{number(item.data_sheet)} ± {item.expected_deviation:.2g}"
     if item.interval is None or item.value is None:
-        return parameter_label(item), unit(item), sheet, "kept", "", "", item.reason
+        return parameter_label(item), unit(item), sheet, AS_STATED, "", ""
     interval = f"{number(item.interval[0])} to {number(item.interval[1])}"
-    return parameter_label(item), unit(item), sheet, number(item.value), interval, scatter_text(item), ""
+    return parameter_label(item), unit(item), sheet, number(item.value), interval, scatter_text(item)
 
 
 def parameter_label(item: CalibratedParameter) -> str:
@@ -128,7 +140,7 @@ def part_rows(calibration: Calibration) -> list[tuple[str, ...]]:
     return [
         (
             _TITLES[item.name],
-            "yes" if item.kept else "no",
+            "yes" if item.kept else AS_STATED if item.name in DATA_SHEET_PARTS else "no",
             f"{100.0 * item.growth:+.1f} %",
             f"{100.0 * item.error:.1f} %",
         )
@@ -195,13 +207,20 @@ def error_text(item: ForecastError) -> str:
     return number(size) + ("" if interval is None else f" ({interval[0]:.2g}-{interval[1]:.2g})")
 
 
-def refused_lines(calibration: Calibration) -> list[str]:
-    """A sentence on the parameters that keep the data sheet's value for one reason, and the drive that would help."""
-    groups: dict[tuple[str, str], list[str]] = {}
+def refused_groups(calibration: Calibration) -> dict[str, list[str]]:
+    """By the reason why parameters are as in the data sheet: lines of these and of the drives that would help."""
+    groups: dict[str, dict[str, list[str]]] = {}
     for item in calibration.parameters:
         if not item.calibrated:
-            groups.setdefault((item.reason, item.helps), []).append(parameter_label(item))
-    return [f"{'; '.join(names)}: {reason} What would help: {helps}." for (reason, helps), names in groups.items()]
+            groups.setdefault(item.reason, {}).setdefault(item.helps, []).append(parameter_label(item))
+    return {
+        reason: [f"{', '.join(names)}: {helps}." for helps, names in lines.items()] for reason, lines in groups.items()
+    }
+
+
+def refused_heading(reason: str) -> str:
+    """What stands above the parameters that one reason leaves as in the data sheet."""
+    return f"As in the data sheet, since of each of them: {reason.rstrip('.')}. Drives that would help:"
 
 
 def unexplained_rows(calibration: Calibration) -> list[tuple[str, ...]]:
@@ -231,9 +250,9 @@ def summary(calibration: Calibration) -> str:
     parts += ["", format_table(PART_HEADER, part_rows(calibration))]
     parts += [] if calibration.imu is None else ["", format_table(MOUNTING_HEADER, mounting_rows(calibration.imu))]
     parts += ["", format_table(SLOPE_HEADER, slope_rows(calibration.slopes))] if calibration.slopes else []
-    parts += ["", format_table(FORECAST_HEADER, forecast_rows(calibration))]
+    parts += ["", MEASURES, "", format_table(FORECAST_HEADER, forecast_rows(calibration))]
     parts += ["", format_table(UNEXPLAINED_HEADER, unexplained_rows(calibration))]
-    lines = refused_lines(calibration)
-    parts += ["", "Not calibrated:", *(f"- {line}" for line in lines)] if lines else []
+    for reason, lines in refused_groups(calibration).items():
+        parts += ["", refused_heading(reason), *(f"- {line}" for line in lines)]
     parts += [] if calibration.converged else ["", "The joint fit did not settle: intervals are too narrow."]
     return "\n".join(parts)

@@ -121,6 +121,14 @@ def test_a_dead_time_that_forecasts_as_well_takes_the_place_of_ramp_or_filter(la
     assert kept == {name: name not in left for name in both}
 
 
+def test_progress_counts_the_parts():
+    losses = Losses({frozenset(): 1.0, DELAY: 1.5, RAMP: 1.5, BOTH: 2.0})
+    lines: list[str] = []
+    select_parts(losses, Made(), candidate(1.0, 1.01, 0.99), lambda name, make: make(), lines.append)
+    assert lines[0] == "forecasts of left-out drives without ramp of each bank's commands: 1 of 2 parts"
+    assert lines[1] == "forecasts of left-out drives without dead time of the commands: 2 of 2 parts"
+
+
 @pytest.mark.parametrize(("slow", "kept"), [(1.0, False), (1.2, True)])
 def test_a_filter_gives_way_to_slower_motors_that_forecast_as_well(slow, kept):
     class Motors(Losses):
