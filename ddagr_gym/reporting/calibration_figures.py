@@ -21,6 +21,7 @@ from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.rendering import palette
 from ddagr_gym.reporting.calibration_text import MODEL_LABELS, error_label, is_difference, parameter_label
 from ddagr_gym.reporting.figures import DASHED, PAGE_WIDTH, blank_figure
+from ddagr_gym.reporting.plain_axes import plain_log
 
 Array = NDArray[np.float64]
 Figure = Any
@@ -37,6 +38,9 @@ DRAWN = (("wheel_speed", None), ("heading", 5.0), ("position", 5.0))
 
 _FARTHEST = 8.0
 """Data-sheet deviations beyond which a parameter is drawn at the edge (ours)."""
+
+_NEAREST = 2.0
+"""That the picture reaches to at the least, so that the band of one is seen (ours)."""
 
 _CHANNELS = (("encoder_right", "right wheels"), ("encoder_left", "left wheels"), ("yaw_rate", "yaw rate"))
 
@@ -84,20 +88,38 @@ def parameter_figure(items: Sequence[CalibratedParameter]) -> Figure:
     axis.axvspan(-1.0, 1.0, color=palette.SHADE, zorder=0)
     axis.axvline(0.0, color=palette.GREY, lw=0.8, zorder=1)
     for row, item in enumerate(items):
-        place = len(items) - 1 - row
-        for estimate in item.estimates:
-            x = (_as_value(item, estimate.value) - item.expected) / item.expected_deviation
-            axis.plot(_inside(x), place + 0.22, ".", ms=3.5, color=palette.PALE, zorder=2)
-        if item.interval is not None:
-            ends = [_inside((v - item.expected) / item.expected_deviation) for v in item.interval]
-            axis.plot(ends, [place, place], color=palette.BLUE, lw=2.2, solid_capstyle="butt", zorder=3)
-        here = _inside((_as_value(item, item.change) - item.expected) / item.expected_deviation)
-        axis.plot(here, place, "o", ms=4.5, color=palette.BLUE, zorder=4)
+        _draw_parameter(axis, len(items) - 1 - row, item)
     axis.set_yticks(range(len(items)), [parameter_label(item) for item in reversed(items)])
     axis.set_ylim(-0.6, len(items) - 0.4)
-    axis.set_xlim(-_FARTHEST - 0.3, _FARTHEST + 0.3)
-    axis.set_xlabel(f"from the value expected, in its standard deviations (beyond {_FARTHEST:g}: at the edge)")
+    farthest = max((abs(x) for item in items for x in (*_drive_places(item), *_places(item))), default=0.0)
+    reach = 1.05 * min(max(farthest, _NEAREST), _FARTHEST)
+    axis.set_xlim(-reach, reach)
+    edge = f" (beyond {_FARTHEST:g}: at the edge)" if farthest > _FARTHEST else ""
+    axis.set_xlabel(f"from the value expected, in its standard deviations{edge}")
     return figure
+
+
+def _draw_parameter(axis: Any, row: float, item: CalibratedParameter) -> None:
+    for place in _drive_places(item):
+        axis.plot(_inside(place), row + 0.22, ".", ms=3.5, color=palette.PALE, zorder=2)
+    here, *ends = map(_inside, _places(item))
+    if ends:
+        axis.plot(ends, [row, row], color=palette.BLUE, lw=2.2, solid_capstyle="butt", zorder=3)
+    axis.plot(here, row, "o", ms=4.5, color=palette.BLUE, zorder=4)
+
+
+def _drive_places(item: CalibratedParameter) -> list[float]:
+    """What single drives say, from the value expected, in its standard deviations."""
+    return [_place(item, _as_value(item, estimate.value)) for estimate in item.estimates]
+
+
+def _places(item: CalibratedParameter) -> list[float]:
+    """The value and, where it is known, the ends of its interval, likewise."""
+    return [_place(item, value) for value in (_as_value(item, item.change), *(item.interval or ()))]
+
+
+def _place(item: CalibratedParameter, value: float) -> float:
+    return (value - item.expected) / item.expected_deviation
 
 
 def _as_value(item: CalibratedParameter, change: float) -> float:
@@ -121,7 +143,7 @@ def error_figure(calibration: Calibration) -> Figure:
         for item in chosen:
             _draw_error(axis, len(drives) - 1 - drives.index(item.drive), item)
         unit = chosen[0].unit if chosen else ""
-        _log_scale(axis)
+        plain_log(axis)
         axis.set_xlabel(f"{error_label(metric, horizon)} [{unit}]")
         axis.set_ylim(-0.6, len(drives) - 0.4)
     panels[0].set_yticks(range(len(drives)), [_short(name) for name in reversed(drives)])
@@ -129,16 +151,6 @@ def error_figure(calibration: Calibration) -> Figure:
     found = dict(zip(labels, handles, strict=True))
     figure.legend(found.values(), found.keys(), ncols=3, loc="outside upper left")
     return figure
-
-
-def _log_scale(axis: Any) -> None:
-    """Logarithmic axis with plain numbers at 1, 2 and 5."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-
-    axis.set_xscale("log")
-    axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axis.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axis.xaxis.set_minor_formatter(NullFormatter())
 
 
 def _short(name: str) -> str:

@@ -6,11 +6,12 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from ddagr_gym.diagnosis.answer.change import BEFORE
-from ddagr_gym.diagnosis.result.near_miss import by_distance
+from ddagr_gym.diagnosis.result.near_miss import by_distance, over_limit
 from ddagr_gym.diagnosis.wording import CHANNEL_NAMES, title
 from ddagr_gym.physics.effects.registry import effect_kind
 from ddagr_gym.rendering import palette
 from ddagr_gym.reporting.figures import PAGE_WIDTH, blank_figure
+from ddagr_gym.reporting.plain_axes import plain_log, plain_symlog
 
 if TYPE_CHECKING:
     from ddagr_gym.diagnosis.answer.change import Change, ChangeCertificate, EffectShift
@@ -33,7 +34,7 @@ def shift_figure(change: Change, named: tuple[str, ...]) -> Any:
     figure = blank_figure(1.1 + 0.24 * len(shifts), PAGE_WIDTH)
     left, right = figure.subplots(1, 2, sharey=True, width_ratios=(3.0, 2.0))
     for place, item in enumerate(shifts):
-        over = item.distance / item.limit
+        over = over_limit(item)
         colour = palette.VERMILLION if item.effect in named else palette.BLUE
         left.barh(place, min(over, _FARTHEST), 0.62, color=colour, zorder=2)
         if over > _FARTHEST:
@@ -44,13 +45,14 @@ def shift_figure(change: Change, named: tuple[str, ...]) -> Any:
         else:
             right.text(1.0, place, "no size that exists", va="center", fontsize=7, color=palette.GREY)
     left.axvline(1.0, color=palette.INK, lw=0.9, zorder=3)
-    left.set_xlim(0.0, _FARTHEST * 1.12)
+    largest = max((over_limit(item) for item in shifts), default=0.0)
+    left.set_xlim(0.0, 1.12 * min(max(largest, 1.1), _FARTHEST))
     left.set_yticks(range(len(shifts)), [title(item.effect) for item in shifts])
     left.set_ylim(-0.6, len(shifts) - 0.4)
     percent = f"{100.0 * change.level:g} %"
     left.set_xlabel(f"shift, in standard deviations over the limit of {percent} false alarms over all effects")
-    right.set_xscale("log")
     right.axvline(1.0, color=palette.GREY, lw=0.8)
+    plain_log(right)
     right.set_xlabel(f"change found {100.0 * change.power:g} times in 100,\nin least sizes that matter")
     return figure
 
@@ -80,10 +82,11 @@ def size_figure(change: Change, named: tuple[str, ...]) -> Any:
         axes[1].plot([before, before], [place - 0.3, place + 0.3], color=palette.GREY, lw=1.2)
         axes[1].errorbar(after, place, xerr=half, fmt="o", ms=4, lw=1.0, color=colour)
     sides = ("before", "after") if change.against == BEFORE else ("ordinary drives", "the drives compared")
+    farthest = max((max(abs(before), abs(after) + half) for _, _, before, after, half in rows), default=0.0)
     for axis, side in zip(axes, sides, strict=True):
         axis.axvline(0.0, color=palette.GREY, lw=0.8, zorder=0)
         axis.set_title(side)
-        axis.set_xscale("symlog", linthresh=2.0)
+        plain_symlog(axis, 2.0, farthest)
         axis.set_xlabel("size, in least sizes that matter")
     axes[0].set_yticks(range(len(rows)), [row[0] for row in rows])
     axes[0].set_ylim(-0.6, len(rows) - 0.4)
@@ -123,7 +126,7 @@ def forecast_figure(certificate: ChangeCertificate, named: bool) -> Any:
         axis.plot([low, high], [place, place], color=colour, lw=5.0, alpha=0.5, solid_capstyle="butt")
         axis.plot(middle, place, "o", ms=6, color=colour)
     axis.axvline(certificate.limit, color=palette.INK, lw=0.9)
-    axis.set_xscale("log")
+    plain_log(axis)
     axis.set_yticks(range(len(shown)), [row[0] for row in shown])
     axis.set_ylim(-0.6, len(shown) - 0.4)
     axis.set_xlabel("mean loss of a sample, forecast by a fit without it")
@@ -145,7 +148,9 @@ def parameter_figure(change: Change) -> Any:
         axis.plot(
             after, place, "o", ms=4, color=palette.BLUE, zorder=4, label="with what changed" if place == 0 else None
         )
-    axis.set_xscale("symlog", linthresh=4.0)
+    farthest = max((abs(x) / item.expected_deviation for item in items for x in (item.change, item.with_effects)),
+                   default=0.0)  # fmt: skip
+    plain_symlog(axis, 4.0, farthest)
     axis.set_yticks(range(len(items)), [item.name.replace("_", " ") for item in items])
     axis.set_ylim(-0.6, len(items) - 0.4)
     axis.set_xlabel("from the calibrated value, in standard deviations of ordinary drives (band: two)")
@@ -171,9 +176,7 @@ def channel_figure(change: Change) -> Any:
         )
         for value, name, look in rows:
             axis.plot(math.sqrt(value), place, ls="none", label=None if place else name, **look)
-    axis.set_xscale("log")
-    for plain in (axis.xaxis.set_major_formatter, axis.xaxis.set_minor_formatter):
-        plain("{x:g}")
+    plain_log(axis)
     axis.set_yticks(range(len(items)), [CHANNEL_NAMES[item.channel] for item in items])
     axis.set_ylim(-0.6, len(items) - 0.4)
     axis.set_xlabel("error of the model in units of its weight, r.m.s.")

@@ -26,6 +26,13 @@ _FARTHEST = 2.5
 """Size over the stated one up to which intervals are drawn whole (ours): what hardly shows an effect says less."""
 
 
+_LEAST_SPAN = 0.1
+"""Size over the stated one that is drawn to either side of it at the least (ours)."""
+
+_NEAR_NOTHING = 0.5
+"""Size over the stated one from which on nothing is drawn too (ours)."""
+
+
 def timed(findings: Sequence[Finding]) -> list[tuple[str, Onset]]:
     """Names and onsets of the findings that have sizes by time."""
     return [(item.name, item.onset) for item in findings if item.onset is not None and item.onset.sizes]
@@ -47,6 +54,8 @@ def onset_figure(findings: Sequence[Finding], recordings: Sequence[str]) -> Any:
             _draw(axis, [size for size in onset.sizes if size.recording == number])
             if onset.kind != CONSTANT and onset.recording == number:
                 _draw_time(axis, onset)
+            axis.set_xmargin(0.01)
+        axes[0].set_ylim(size_limits([size for size in onset.sizes if size.recording in numbers]))
         axes[0].set_ylabel(f"{title(name)}\nsize over the stated one")
     for axis, number in zip(grid[0], numbers, strict=True):
         name = recordings[number] if number < len(recordings) else f"recording {number + 1}"
@@ -68,12 +77,25 @@ def _draw(axis: Axes, sizes: Sequence[TimedSize]) -> None:
     axis.axhline(0.0, color=palette.GREY, lw=0.8)
     axis.axhline(1.0, color=palette.GREY, lw=0.8, ls=":")
     for item in sizes:
-        half = _NINETY * item.deviation
-        low, high = max(item.size - half, -_FARTHEST + 1.0), min(item.size + half, _FARTHEST)
+        low, high = _interval(item)
         axis.fill_between([item.start, item.end], low, high, color=palette.BLUE, alpha=0.25, lw=0.0)
         if -_FARTHEST + 1.0 < item.size < _FARTHEST:
             axis.plot([item.start, item.end], [item.size, item.size], color=palette.BLUE, lw=1.6)
-    axis.set_ylim(-_FARTHEST + 1.0, _FARTHEST)
+
+
+def _interval(item: TimedSize) -> tuple[float, float]:
+    """Ends of a 90 % interval, as far as they are drawn."""
+    half = _NINETY * item.deviation
+    return max(item.size - half, -_FARTHEST + 1.0), min(item.size + half, _FARTHEST)
+
+
+def size_limits(sizes: Sequence[TimedSize]) -> tuple[float, float]:
+    """Vertical limits: all intervals and the stated size, nothing where an interval comes near it, and a margin."""
+    ends = [end for item in sizes for end in _interval(item)]
+    low, high = min(*ends, 1.0 - _LEAST_SPAN), max(*ends, 1.0 + _LEAST_SPAN)
+    low = min(low, 0.0) if low < _NEAR_NOTHING else low
+    margin = 0.06 * (high - low)
+    return max(low - margin, -_FARTHEST + 1.0), min(high + margin, _FARTHEST)
 
 
 def _draw_time(axis: Axes, onset: Onset) -> None:
