@@ -181,6 +181,10 @@ class Simulator:
         self._no_record = tuple(no_record(count))
         self._threads = RowThreads(count, threads)
 
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        # functions lie elsewhere in another process
+        self.__dict__ |= state | {"_addresses": effect_table(state["effects"])[1]}
+
     def _set_fields(self, fields: Sequence[SoilField]) -> None:
         if len({field.values.shape for field in fields}) > 1:
             shapes = sorted({field.values.shape for field in fields})
@@ -200,7 +204,7 @@ class Simulator:
             self.field_index[index] = -1
             return
         if self._fields.shape[0] != self.count or self._fields.shape[1:] != field.values.shape:
-            if (self.field_index >= 0).any():
+            if (np.delete(self.field_index, index) >= 0).any():
                 raise InputError(
                     f"soil field of shape {field.values.shape} in a batch of shape {self._fields.shape[1:]}: "
                     "give all fields of one batch the same shape."

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.control.observation import EKF_FEATURES, FEATURE_SCALES
-from ddagr_gym.envs.turn_kernel import OBSERVATION_LIMIT
+from ddagr_gym.envs.constants import OBSERVATION_LIMIT
 from ddagr_gym.errors import unknown_name
 from ddagr_gym.estimation import (
     BatchFilter,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
@@ -29,24 +30,30 @@ Fields = Mapping[str, Any]
 Given = TypeVar("Given")
 
 
-def _of_fields(given: Given | Fields, kind: type[Given], name: str) -> Given:
-    """The argument ``name`` as it is, or from its fields."""
-    return config_from(dict(given), kind, source=name) if isinstance(given, Mapping) else given
+def _of_fields(given: Given | Fields, kind: type[Given], name: str, others: str = "") -> Given:
+    """The argument ``name`` as it is, or from its fields; ``others`` says what else it may be."""
+    if isinstance(given, Mapping):
+        return config_from(dict(given), kind, source=name)
+    if not isinstance(given, kind):
+        raise InputError(f"{name} is {given!r}: give {others}a {kind.__name__}, or its fields by name.")
+    return given
 
 
 def find_soil(soil: str | Path | Soil | SoilDistribution | Fields) -> Soil | SoilDistribution:
     """Soil or distribution by name, from a YAML file or from its fields; objects pass through.
 
     Raises:
-        InputError: unknown name, with the closest ones; a file that is neither.
+        InputError: unknown name, with the closest ones; a file or an object that is neither.
     """
     if isinstance(soil, Path):
         soil = str(soil)
     if isinstance(soil, Mapping):
         kind: type[Soil | SoilDistribution] = SoilDistribution if "reference_pressure" in soil else Soil
         return _of_fields(soil, kind, "soil")
-    if not isinstance(soil, str):
+    if isinstance(soil, SoilDistribution):
         return soil
+    if not isinstance(soil, str):
+        return _of_fields(soil, Soil, "soil", "a name, a file, ")
     if is_file(soil):
         return _soil_of_file(soil)
     if soil in distribution_names():
@@ -110,10 +117,12 @@ def make_settings(
             randomisation = Randomisation(mass=0.0, yaw_inertia=0.0, motor_rate=0.0, command_delay=0.0)
     elif ground:
         raise InputError(f"the ground is {ground!r} and there is no calibration: give its folder as calibration=.")
-    if isinstance(randomisation, bool):
+    if isinstance(randomisation, bool | np.bool_):
         randomisation = Randomisation() if randomisation else Randomisation.none()
+    if isinstance(robot, str | Path):
+        robot = get_robot(str(robot))
     return TurnSettings(
-        robot=get_robot(str(robot)) if isinstance(robot, str | Path) else _of_fields(robot, Robot, "robot"),
+        robot=_of_fields(robot, Robot, "robot", "a name, a file, "),
         soil=find_soil(soil),
         radius=_range(radius),
         side=side,
@@ -121,7 +130,7 @@ def make_settings(
         run_out=run_out,
         speed=_range(speed),
         sensors=_of_fields(sensors, Sensors, "sensors"),
-        randomisation=_of_fields(randomisation, Randomisation, "randomisation"),
+        randomisation=_of_fields(randomisation, Randomisation, "randomisation", "True, False, "),
         reward=_of_fields(reward, RewardWeights, "reward"),
         effects=load_effects(effects),
         numerics=_of_fields(numerics, Numerics, "numerics"),
@@ -132,9 +141,23 @@ def make_settings(
     )
 
 
-def _range(value: float | tuple[float, float] | list[float]) -> float | tuple[float, float]:
-    """(low, high) as a tuple, for which JSON has a list."""
-    return tuple(value) if isinstance(value, list) else value  # type: ignore[return-value]
+def settings_from(arguments: Mapping[str, Any]) -> TurnSettings:
+    """:func:`make_settings` of what ``gym.make`` was given.
+
+    Raises:
+        InputError: as there, and for an argument that is unknown, with the closest ones.
+    """
+    known = inspect.signature(make_settings).parameters
+    for name in arguments:
+        if name not in known:
+            raise unknown_name("argument of the environment", name, known)
+    return make_settings(**arguments)
+
+
+def _range(value: Any) -> Any:
+    """Python's numbers for numpy's, and (low, high) as a tuple, for which JSON has a list."""
+    plain = value.tolist() if isinstance(value, np.ndarray | np.number) else value
+    return tuple(plain) if isinstance(plain, list) else plain
 
 
 def check_info_level(level: str) -> str:
@@ -147,7 +170,7 @@ def check_info_level(level: str) -> str:
 def check_mode(mode: str | None, allowed: Iterable[str | None]) -> str | None:
     """``mode`` if it is None or allowed, else an InputError."""
     if mode is not None and mode not in allowed:
-        raise InputError(f"render_mode is {mode!r}: give None, {', '.join(repr(m) for m in allowed)}.")
+        raise InputError(f"render_mode is {mode!r}: give {' or '.join(map(repr, (None, *allowed)))}.")
     return mode
 
 

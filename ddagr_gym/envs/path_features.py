@@ -13,8 +13,8 @@ from ddagr_gym.control.path_tracker import path_errors
 from ddagr_gym.control.row_turn import SIDES, RowTurn
 from ddagr_gym.control.tracker_settings import SETTLING
 from ddagr_gym.control.turn_controller import commanded_turn
+from ddagr_gym.envs.constants import OBSERVATION_LIMIT
 from ddagr_gym.envs.ekf_features import FEATURE_COUNT, EkfFeatureBatch
-from ddagr_gym.envs.turn_kernel import OBSERVATION_LIMIT
 from ddagr_gym.estimation import InertialModel, Reckoned
 from ddagr_gym.estimation.inertial_layout import GRAVITY
 from ddagr_gym.estimation.layout import PARAMETER, PARAMETER_SIZE

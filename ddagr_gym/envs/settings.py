@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import dataclass, field, fields, replace
+from numbers import Real
 
 import numpy as np
 
+from ddagr_gym.control.observation import OBSERVATION
 from ddagr_gym.control.row_turn import SIDES, RowTurn
+from ddagr_gym.control.timing import CONTROL_INTERVAL, CONTROL_PERIOD
 from ddagr_gym.envs.calibrated_draws import CalibratedDraws, GroundDraws
+from ddagr_gym.envs.constants import EPISODE_DURATION, HEADLAND_DEPTH, OBSERVATION_LIMIT, ROW_MARGIN
 from ddagr_gym.envs.ekf_features import check_filter
-from ddagr_gym.errors import InputError, unknown_name
+from ddagr_gym.errors import InputError, InputWarning, unknown_name
 from ddagr_gym.parameters import Imu, Numerics, Robot, Sensors, Soil
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.physics.effects.slope import Slope
@@ -18,6 +23,8 @@ from ddagr_gym.physics.soil_draws import SoilDistribution, draw_soil, get_distri
 from ddagr_gym.physics.terrain import SoilField
 from ddagr_gym.presets import ddagr
 from ddagr_gym.validated import Validated, bounded
+
+_LARGEST_SPEED = OBSERVATION_LIMIT * next(scale for name, _, scale in OBSERVATION if name == "target_speed")
 
 
 @dataclass(frozen=True)
@@ -150,14 +157,36 @@ class TurnSettings(Validated):
             )
         if check_filter(self.filter) != "flat" and not self.ekf_features:
             raise InputError(f"the filter is {self.filter!r} and nothing shows it: give ekf_features=True too.")
-        if self.side != "random" and self.side not in SIDES:
+        if not isinstance(self.side, str) or self.side not in (*SIDES, "random"):
             raise unknown_name("side", self.side, [*SIDES, "random"])
-        for name, value in (("radius", self.radius), ("speed", self.speed)):
-            if not isinstance(value, (int, float)) and (len(value) != 2 or value[0] > value[1]):
-                raise InputError(f"TurnSettings.{name} is {value!r}: give one number, or (low, high).")
-        for radius in np.atleast_1d(np.asarray(self.radius, dtype=float)):
-            for speed in np.atleast_1d(np.asarray(self.speed, dtype=float)):
-                self.turn(float(radius), "left", float(speed))
+        check_rate(self.sensors)
+        self._check_turns()
+
+    def _check_turns(self) -> None:
+        """Refuse turns that cannot be made; warn of those that take longer than an episode."""
+        radii, speeds = _ends("radius", self.radius), _ends("speed", self.speed)
+        for radius in radii:
+            for speed in speeds:
+                self.turn(radius, "left", speed)
+        if radii[1] >= HEADLAND_DEPTH:
+            raise InputError(
+                f"TurnSettings.radius is {self.radius!r} and the headland is {HEADLAND_DEPTH:g} m deep, so that the "
+                "commanded path itself leaves it: give less."
+            )
+        if speeds[1] > _LARGEST_SPEED:
+            raise InputError(
+                f"TurnSettings.speed is {self.speed!r} and the observation shows at most {_LARGEST_SPEED:g} m/s: give "
+                "at most that."
+            )
+        # of ranges the middle: that a few of their turns take too long is usual
+        middle = self.turn(sum(radii) / 2.0, "left", sum(speeds) / 2.0)
+        if middle.duration > EPISODE_DURATION:
+            warnings.warn(
+                f"a turn of {middle.radius:g} m at {middle.speed:g} m/s takes {middle.duration:.0f} s and an "
+                f"episode {EPISODE_DURATION:g} s: give a larger speed, or more max_episode_steps.",
+                InputWarning,
+                stacklevel=2,
+            )
 
     def turn(self, radius: float, side: str, speed: float) -> RowTurn:
         """The commanded manoeuvre of a radius [m], side and reference speed [m/s]."""
@@ -237,10 +266,33 @@ class TurnSettings(Validated):
             return None
         # one extent for all episodes, so that a batch can hold their grids in one array
         radius = float(np.max(self.radius))
-        extent = (-turn.run_in - 0.5, radius + 1.0, -2.0 * radius - 0.8, 2.0 * radius + 0.8)
+        extent = (-max(turn.run_in, turn.run_out) - ROW_MARGIN, radius + 1.0, -2.0 * radius - 0.8, 2.0 * radius + 0.8)
         return soil_field(soil, rng, spread.soil_variation, spread.correlation_length, extent)
+
+
+def check_rate(sensors: Sensors) -> None:
+    """Refuse an IMU whose samples do not make one action in a control period.
+
+    Raises:
+        InputError: with the rate that does.
+    """
+    rate, needed = sensors.imu.sample_rate, CONTROL_INTERVAL / CONTROL_PERIOD
+    if not math.isclose(rate, needed, rel_tol=1e-9):
+        raise InputError(
+            f"the IMU's sample_rate is {rate:g} Hz and a row turn takes {CONTROL_INTERVAL} samples for each action of "
+            f"{CONTROL_PERIOD:g} s: give {needed:g} Hz."
+        )
+
+
+def _ends(name: str, value: object) -> tuple[float, float]:
+    """Both ends of a number or of (low, high)."""
+    ends = value if isinstance(value, tuple | list) else (value, value)
+    numbers = [float(end) for end in ends if not isinstance(end, bool) and isinstance(end, Real)]
+    if len(ends) != 2 or len(numbers) != 2 or not numbers[0] <= numbers[1]:
+        raise InputError(f"TurnSettings.{name} is {value!r}: give one number, or (low, high).")
+    return numbers[0], numbers[1]
 
 
 def _drawn(value: float | tuple[float, float], rng: np.random.Generator) -> float:
     """A number as it is, or one drawn evenly from (low, high)."""
-    return float(value) if isinstance(value, (int, float)) else float(rng.uniform(*value))
+    return float(rng.uniform(*value)) if isinstance(value, tuple | list) else float(value)

@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 from ddagr_gym.control.observation import OBSERVATION
 from ddagr_gym.control.timing import CONTROL_INTERVAL
 from ddagr_gym.envs import turn_kernel as kernel
+from ddagr_gym.envs.constants import OBSERVATION_LIMIT
 from ddagr_gym.envs.ekf_features import EkfFeatureBatch
 from ddagr_gym.envs.path_features import PathFeatureBatch
-from ddagr_gym.envs.settings import Episode, TurnSettings
+from ddagr_gym.envs.settings import Episode, TurnSettings, check_rate
 from ddagr_gym.errors import InputError
 from ddagr_gym.physics import layout
 from ddagr_gym.physics.effects import Effect
@@ -69,11 +70,12 @@ class TurnBatch:
         self._noise = np.zeros((count, CONTROL_INTERVAL, layout.NOISE_CHANNELS))
         self._draws = NormalDraws()
         self._everyone = np.arange(count)
-        self._outer_radius = np.zeros(count)
+        # of the nominal tyres: a robot does not know how its own are pumped up or worn
+        self._outer_radius = np.full(count, settings.robot.outer_radius)
         self._weights = np.array(astuple(settings.reward))
         self.features = feature_batch(settings, count) if settings.ekf_features else None
         entries = len(OBSERVATION) + (0 if self.features is None else self.features.size)
-        self.observation_space = spaces.Box(-kernel.OBSERVATION_LIMIT, kernel.OBSERVATION_LIMIT, (entries,), np.float32)
+        self.observation_space = spaces.Box(-OBSERVATION_LIMIT, OBSERVATION_LIMIT, (entries,), np.float32)
         self.command_limit = settings.robot.maximum_wheel_speed
 
     def reset(self, chosen: Sequence[int], rngs: Sequence[np.random.Generator], options: dict[str, Any] | None) -> None:
@@ -85,19 +87,21 @@ class TurnBatch:
             options: ``{"episode": Episode}`` to repeat one; otherwise each draws its own.
 
         Raises:
-            InputError: unknown option.
+            InputError: unknown option, or an episode that this batch cannot drive; then nothing has changed.
         """
         fixed = self._episode_option(options)
+        episodes = [fixed or self.settings.draw(rngs[n]) for n in chosen]
+        self._check(chosen, episodes)
         for n in chosen:
-            episode = fixed or self.settings.draw(rngs[n])
+            self.simulator.set_field(n, None)
+        for n, episode in zip(chosen, episodes, strict=True):
             self.episodes[n] = episode
             self._start(n, episode)
         indices = np.asarray(chosen, dtype=np.int64)
-        starts = [self.episodes[n] for n in chosen]
         state = {
-            "x": [-e.turn.run_in for e in starts if e],
-            "y": [e.lateral_offset for e in starts if e],
-            "yaw": [e.heading_offset for e in starts if e],
+            "x": [-episode.turn.run_in for episode in episodes],
+            "y": [episode.lateral_offset for episode in episodes],
+            "yaw": [episode.heading_offset for episode in episodes],
         }
         self.simulator.reset(indices, state)
         self.tasks[indices, kernel.LAST_X] = state["x"]
@@ -122,6 +126,24 @@ class TurnBatch:
             raise InputError(f"reset option 'episode' is {episode!r}: give a ddagr_gym.envs.Episode.")
         return episode
 
+    def _check(self, chosen: Sequence[int], episodes: Sequence[Episode]) -> None:
+        """Refuse what the batch cannot drive before anything of it is changed."""
+        for episode in episodes:
+            check_rate(episode.sensors)
+            if episode.slope[0] and not self._sloping:
+                raise InputError(
+                    f"the episode's ground slopes by {episode.slope[0]:g} rad: give a randomisation of slope."
+                )
+        replaced = set(chosen)
+        others = [episode for n, episode in enumerate(self.episodes) if n not in replaced]
+        fields = [episode.field for episode in (*others, *episodes) if episode is not None]
+        shapes = {field.values.shape for field in fields if field is not None}
+        if len(shapes) > 1:
+            raise InputError(
+                f"soil grids of shapes {sorted(shapes)} in one batch: give all environments episodes of the same "
+                "radius."
+            )
+
     def _start(self, n: int, episode: Episode) -> None:
         soils = episode.soils if not isinstance(episode.soils, tuple) else list(episode.soils)
         self.simulator.configure(n, episode.robot, soils, episode.sensors)
@@ -129,8 +151,6 @@ class TurnBatch:
         self.simulator.effect_parameters[n, 0, 0] = episode.command_delay
         if self._sloping:
             self.simulator.effect_parameters[n, 1, :2] = episode.slope
-        elif episode.slope[0]:
-            raise InputError(f"the episode's ground slopes by {episode.slope[0]:g} rad: give a randomisation of slope.")
         turn = episode.turn
         task = self.tasks[n]
         task[:] = 0.0
@@ -139,7 +159,6 @@ class TurnBatch:
         task[kernel.RUN_IN] = turn.run_in
         task[kernel.RUN_OUT] = turn.run_out
         task[kernel.SPEED] = turn.speed
-        self._outer_radius[n] = episode.robot.wheels[0].outer_radius
 
     def observe_start(self, chosen: Sequence[int], observations: NDArray[np.float32]) -> None:
         """Write the first observation of the ``chosen`` environments into ``observations`` (N, entries)."""

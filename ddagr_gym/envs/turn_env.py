@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.envs import turn_kernel as kernel
-from ddagr_gym.envs.options import action_space, check_info_level, check_mode, make_settings
+from ddagr_gym.envs.options import action_space, check_info_level, check_mode, settings_from
 from ddagr_gym.envs.scene_history import SceneHistory
 from ddagr_gym.envs.settings import Episode
 from ddagr_gym.envs.turn_batch import TurnBatch, check_action
@@ -47,7 +47,7 @@ class TurnEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     8    target_radius       m         1.0           R*
     9    target_speed        m/s       0.25          reference speed
     10   heading_to_go       rad       pi            heading change left, from the integrated gyro
-    11   run_in_to_go        m         1.0           distance left before the turn, from the encoders
+    11   run_in_to_go        m         1.0           distance left before the turn: encoders, nominal tyre
     ===  ==================  ========  ============  ==========================================================
 
     ``ekf_features=True``, or the id ``DDAGR-Turn-EKF-v0``, appends the twelve entries of
@@ -90,7 +90,7 @@ class TurnEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     def __init__(self, render_mode: str | None = None, info_level: str = "small", **settings: Any) -> None:
         self.render_mode = check_mode(render_mode, self.metadata["render_modes"])
         self.info_level = check_info_level(info_level)
-        self.settings = make_settings(**settings)
+        self.settings = settings_from(settings)
         self.action_space = action_space()  # type: ignore[assignment]
         self.batch = TurnBatch(self.settings)
         self.observation_space = self.batch.observation_space

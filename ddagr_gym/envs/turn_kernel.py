@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from ddagr_gym.control.observation import SCALES
 from ddagr_gym.control.row_turn import FURROW_SLACK
+from ddagr_gym.envs.constants import HEADLAND_DEPTH, OBSERVATION_LIMIT, ROW_MARGIN
 from ddagr_gym.jit import kernel
 from ddagr_gym.physics.layout import (
     BOGGED,
@@ -84,13 +85,8 @@ TERMS = (
 NO_ENDING, EXIT_REACHED, BOGGED_DOWN, LEFT_HEADLAND, TIME_OUT = range(5)
 """Numbered endings: 1 to 3 terminate, 4 truncates."""
 
-OBSERVATION_LIMIT = 10.0
-"""Bound of the scaled observations [-] (ours): their scales are those of a usual turn, so that only faults reach it."""
-
 CORRIDOR = 0.35
 """Beyond this distance from its row's line a robot between the rows stands on a bed [m] (ours)."""
-HEADLAND_DEPTH = 3.0
-"""Depth of the headland from the boundary, to a ditch or road [m] (ours)."""
 HEADLAND_MARGIN = 1.5
 """Room beside the two rows [m] (ours)."""
 _LARGEST_EXIT_RATIO = 10.0  # (ours) more than ten furrows off is no worse an exit, and the reward stays bounded
@@ -116,7 +112,7 @@ def _off_headland(task: Array, x: float, y: float) -> bool:
     side = task[SIGN] * y
     if x < -0.05:
         off_row = min(abs(side), abs(side - 2.0 * task[RADIUS])) > CORRIDOR
-        return off_row or x < -task[RUN_IN] - 0.5
+        return off_row or x < -max(task[RUN_IN], task[RUN_OUT]) - ROW_MARGIN
     return x > HEADLAND_DEPTH or side < -HEADLAND_MARGIN or side > 2.0 * task[RADIUS] + HEADLAND_MARGIN
 
 

@@ -13,12 +13,15 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from ddagr_gym.envs.constants import EPISODE_STEPS
-from ddagr_gym.envs.options import action_space, check_info_level, check_mode, make_settings
+from ddagr_gym.envs.options import action_space, check_info_level, check_mode, settings_from
 from ddagr_gym.envs.turn_batch import TurnBatch, check_action
 from ddagr_gym.envs.turn_info import batch_info
-from ddagr_gym.errors import InputError, unknown_name
+from ddagr_gym.errors import InputError, at_least, unknown_name
 
 Observations = NDArray[np.float32]
+
+UNLIMITED = -1
+"""As ``max_episode_steps``: no time limit, as ``gym.make`` has it."""
 
 
 def _autoreset_mode(mode: str | AutoresetMode) -> AutoresetMode:
@@ -33,7 +36,7 @@ class TurnVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]):
 
     Args:
         num_envs: N.
-        max_episode_steps: time limit.
+        max_episode_steps: time limit, -1 for none.
         autoreset_mode: an ``AutoresetMode`` or its value: "NextStep" (default), "SameStep", "Disabled".
         threads: threads that share the batch; results do not depend on it.
         render_mode: None; pictures are made by the single environment.
@@ -53,15 +56,15 @@ class TurnVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]):
         info_level: str = "small",
         **settings: Any,
     ) -> None:
-        if max_episode_steps < 1:
-            raise InputError(f"max_episode_steps is {max_episode_steps}: give at least 1.")
+        if max_episode_steps != UNLIMITED:
+            at_least(max_episode_steps=(max_episode_steps, 1))
         self.num_envs = num_envs
         self.render_mode = check_mode(render_mode, ())
         self.autoreset_mode = _autoreset_mode(autoreset_mode)
         self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
         self.info_level = check_info_level(info_level)
         self.max_episode_steps = max_episode_steps
-        self.settings = make_settings(**settings)
+        self.settings = settings_from(settings)
         self.batch = TurnBatch(self.settings, num_envs, threads)
         self.single_observation_space = self.batch.observation_space
         self.single_action_space = action_space()
@@ -86,7 +89,8 @@ class TurnVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]):
         self._seed(None)
         return tuple(self._seeds)
 
-    def _seed(self, seed: int | Sequence[int | None] | None) -> None:
+    def _seed(self, seed: int | Sequence[int | None] | None, chosen: NDArray[np.int64] | None = None) -> None:
+        """Seed the ``chosen`` environments, all by default; at first each gets a generator, chosen or not."""
         given: list[int | None]
         if seed is None:
             given = [None] * self.num_envs
@@ -101,19 +105,19 @@ class TurnVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]):
             self._rngs = [np.random.default_rng(0)] * self.num_envs
             self._seeds = [0] * self.num_envs
         for n, value in enumerate(given):
-            if fresh or value is not None:
+            if fresh or (value is not None and (chosen is None or n in chosen)):
                 self._rngs[n], self._seeds[n] = seeding.np_random(value)
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observations, dict[str, Any]]:
-        """Reset all environments, or those in ``options["reset_mask"]`` (N,) bool.
+        """Reset all environments, or those in ``options["reset_mask"]`` (N,) bool; the others run on undisturbed.
 
         Raises:
             InputError: number of seeds, mask or options wrong.
         """
-        self._seed(seed)
         chosen = self._chosen(options)
+        self._seed(seed, chosen)
         self._start(chosen, options)
         info = batch_info(self.batch, self.info_level)
         mask = np.zeros(self.num_envs, dtype=np.bool_)
@@ -121,8 +125,9 @@ class TurnVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]):
         return self._observations.copy(), _masked(info, mask)
 
     def spread_time_limits(self) -> None:
-        """Let the running episodes end at times spread evenly up to the limit, the first ones soon."""
-        self._steps += np.arange(self.num_envs)[::-1] * self.max_episode_steps // self.num_envs
+        """Let the running episodes end at times spread evenly up to the limit, if there is one, the first ones soon."""
+        if self.max_episode_steps != UNLIMITED:
+            self._steps += np.arange(self.num_envs)[::-1] * self.max_episode_steps // self.num_envs
 
     def _chosen(self, options: dict[str, Any] | None) -> NDArray[np.int64]:
         mask = (options or {}).get("reset_mask")
@@ -162,7 +167,8 @@ class TurnVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]):
         self.batch.step(checked, self._rngs, self._rewards, self._observations, active)
         self._steps[active] += 1
         terminated = (self.batch.endings != 0) & ~self._ended
-        truncated = (self._steps >= self.max_episode_steps) & ~self._ended
+        limited = self.max_episode_steps != UNLIMITED
+        truncated = limited & (self._steps >= self.max_episode_steps) & ~self._ended
         rewards = np.where(self._ended, 0.0, self._rewards)
         if resting.size:
             self._start(resting)

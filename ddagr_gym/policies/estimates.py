@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.control.observation import FEATURE_SCALES, OBSERVATION, PLACES
+from ddagr_gym.envs.constants import OBSERVATION_LIMIT
 from ddagr_gym.envs.ekf_features import FEATURE_COUNT, EkfFeatureBatch
-from ddagr_gym.envs.turn_kernel import OBSERVATION_LIMIT
 from ddagr_gym.errors import InputError
 from ddagr_gym.estimation import BatchFilter, FilterModel, SoilPrior
 from ddagr_gym.parameters import Robot, Sensors

@@ -11,8 +11,8 @@ from gymnasium.utils import RecordConstructorArgs
 from numpy.typing import NDArray
 
 from ddagr_gym.deprecation import renamed
+from ddagr_gym.envs.constants import OBSERVATION_LIMIT
 from ddagr_gym.envs.turn_batch import feature_batch
-from ddagr_gym.envs.turn_kernel import OBSERVATION_LIMIT
 from ddagr_gym.errors import InputError
 
 __getattr__ = renamed(__name__, {"EkfFeatures": f"{__name__}:EKFObservation"}, goes="0.4.0")

@@ -10,6 +10,7 @@ from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvObs, VecEnvStepReturn
 
 from ddagr_gym.envs.turn_vector_env import TurnVectorEnv
+from ddagr_gym.errors import InputError
 
 
 class TurnVecEnv(VecEnv):
@@ -32,15 +33,30 @@ class TurnVecEnv(VecEnv):
         self._actions = np.zeros((num_envs, 2), dtype=np.float32)
 
     def reset(self) -> VecEnvObs:
-        """Reset all environments; seeds come from :meth:`seed`."""
+        """Reset all environments; seeds come from :meth:`seed`, options from :meth:`set_options`.
+
+        Raises:
+            InputError: options that are not the same for all environments.
+        """
         seeds = self._seeds if any(seed is not None for seed in self._seeds) else None
-        observations, _ = self.env.reset(seed=seeds)
+        observations, _ = self.env.reset(seed=seeds, options=self._common_options())
         if self.staggered:
             self.env.spread_time_limits()
         self._reset_seeds()
         self._reset_options()
         self.reset_infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         return observations
+
+    def _common_options(self) -> dict[str, Any]:
+        options: dict[str, Any] = self._options[0]
+        for other in self._options[1:]:
+            # SB3 copies options, but what is one object stays one
+            if other.keys() != options.keys() or any(other[name] is not options[name] for name in options):
+                raise InputError(
+                    f"the options {options!r} and {other!r} of two environments differ: the batch resets all of them "
+                    "by one, give a single dictionary."
+                )
+        return options
 
     def step_async(self, actions: np.ndarray) -> None:
         """Keep the actions for :meth:`step_wait`."""
@@ -71,13 +87,15 @@ class TurnVecEnv(VecEnv):
         return [value for _ in self._get_indices(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
-        """Set an attribute of the batch: it is shared by all environments."""
+        """Set an attribute of the batch: it is shared by all environments, and ``indices`` must name all."""
+        self._check_all(indices, f"{attr_name} is set")
         setattr(self.env, attr_name, value)
 
     def env_method(
         self, method_name: str, *method_args: Any, indices: VecEnvIndices = None, **method_kwargs: Any
     ) -> list[Any]:
-        """Call a method of the batch once; its result is repeated for each index."""
+        """Call a method of the batch once, ``indices`` must name all; its result is repeated for each."""
+        self._check_all(indices, f"{method_name} is called")
         result = getattr(self.env, method_name)(*method_args, **method_kwargs)
         return [result for _ in self._get_indices(indices)]
 
@@ -88,6 +106,10 @@ class TurnVecEnv(VecEnv):
     def get_images(self) -> Sequence[np.ndarray | None]:
         """No pictures: the batch does not render."""
         return [None for _ in range(self.num_envs)]
+
+    def _check_all(self, indices: VecEnvIndices, what: str) -> None:
+        if set(self._get_indices(indices)) != set(range(self.num_envs)):
+            raise InputError(f"indices are {indices!r} and {what} for the whole batch: give None.")
 
     def _get_indices(self, indices: int | Iterable[int] | None) -> Iterable[int]:
         return super()._get_indices(indices)

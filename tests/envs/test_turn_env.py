@@ -2,6 +2,9 @@
 
 import dataclasses
 import math
+import pickle
+import subprocess
+import sys
 import warnings
 
 import gymnasium
@@ -16,9 +19,9 @@ from ddagr_gym.control.row_turn import RowTurn
 from ddagr_gym.envs import Episode, Randomisation
 from ddagr_gym.envs.registration import TURN_ID, register_environments
 from ddagr_gym.envs.turn_kernel import TERMS
-from ddagr_gym.errors import InputError
+from ddagr_gym.errors import InputError, InputWarning
 from ddagr_gym.evaluation.calibration import calibrate_constant_speeds
-from ddagr_gym.parameters import Sensors, Soil
+from ddagr_gym.parameters import Imu, Sensors, Soil
 from ddagr_gym.physics import layout
 from ddagr_gym.presets import get_robot, get_soil
 
@@ -130,6 +133,21 @@ def test_heading_to_go_follows_the_gyro_and_the_side():
         assert decode(observation).heading_to_go == pytest.approx(math.pi - turned, abs=0.01)
 
 
+def test_run_in_counts_down_by_the_nominal_tyre_whatever_the_true_one_is():
+    env = make(soil="thesis_a1", side="left", randomisation=False)
+    env.reset(seed=0)
+    episode = env.unwrapped.episode
+    wheels = tuple(dataclasses.replace(w, major_radius=1.1 * w.major_radius) for w in episode.robot.wheels)
+    worn = dataclasses.replace(episode, robot=dataclasses.replace(episode.robot, wheels=wheels))
+    observation, _ = env.reset(seed=0, options={"episode": worn})
+    rolled = 0.0
+    for _ in range(10):
+        observation, *_ = env.step(np.full(2, 0.36, np.float32))
+        seen = decode(observation)
+        rolled += 0.08 * (seen.encoder_right + seen.encoder_left) / 2.0
+    assert seen.run_in_to_go == pytest.approx(0.5 - rolled * get_robot("ddagr").outer_radius, abs=1e-5)
+
+
 def test_run_in_counts_down_with_the_encoders():
     env = make(randomisation=False, info_level="full", run_in=0.6)
     observation, _ = env.reset(seed=0)
@@ -221,6 +239,68 @@ def test_an_episode_can_be_repeated():
     assert_same(first, again)
 
 
+def test_an_episode_of_another_radius_takes_the_place_of_the_one_that_runs():
+    wide = make(radius=1.2)
+    wide.reset(seed=3)
+    env = make()
+    env.reset(seed=11)
+    observation, _ = env.reset(options={"episode": wide.unwrapped.episode})
+    assert decode(observation).target_radius == pytest.approx(1.2)
+    env.step(np.zeros(2, np.float32))
+
+
+def test_an_episode_that_cannot_be_driven_changes_nothing():
+    env = make(info_level="full")
+    env.reset(seed=11)
+    before = env.unwrapped.episode
+    rows = env.unwrapped.batch.simulator.rows.copy()
+    sloping = dataclasses.replace(before, slope=(0.05, 0.0))
+    slow = dataclasses.replace(before, sensors=Sensors(imu=Imu(sample_rate=50.0)))
+    for episode, words in ((sloping, "slope"), (slow, "sample_rate")):
+        with pytest.raises(InputError, match=words):
+            env.reset(options={"episode": episode})
+        assert env.unwrapped.episode is before
+        np.testing.assert_array_equal(env.unwrapped.batch.simulator.rows, rows)
+
+
+@pytest.mark.parametrize("radius", [np.float32(0.8), np.float64(0.8), np.array([0.7, 0.9]), (np.float32(0.7), 1), 1])
+def test_numbers_of_numpy_serve_as_well(radius):
+    observation, _ = make(radius=radius, speed=np.float32(0.2)).reset(seed=0)
+    assert 0.7 <= decode(observation).target_radius <= 1.0
+
+
+def test_a_turn_that_outlasts_the_episode_is_warned_of():
+    with pytest.warns(InputWarning, match=r"a turn of 2\.5 m at 0\.2 m/s takes 44 s and an episode 25 s"):
+        make(radius=2.5)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        make(radius=(0.65, 1.2), speed=(0.16, 0.30))
+
+
+def test_a_long_run_out_is_reached():
+    turn = RowTurn(radius=0.8, side="left", run_in=0.5, run_out=1.5)
+    controller = calibrate_constant_speeds(get_robot("ddagr"), get_soil("thesis_a1"), turn)
+    arguments = {"soil": "thesis_a1", "side": "left", "randomisation": False, "max_episode_steps": 400}
+    info = drive(make(run_out=1.5, **arguments), controller)[-1]
+    assert (info["ending"], info["success"]) == (1, True)
+
+
+def test_a_pickled_environment_goes_on_in_another_process(tmp_path):
+    env = make(effects=["towed_drag=20"])
+    env.reset(seed=3)
+    action = np.full(2, 0.4, np.float32)
+    env.step(action)
+    (tmp_path / "env.pkl").write_bytes(pickle.dumps(env))
+    script = f"""
+import pickle, numpy
+env = pickle.loads(open({str(tmp_path / "env.pkl")!r}, "rb").read())
+numpy.save({str(tmp_path / "seen.npy")!r}, env.step(numpy.full(2, 0.4, numpy.float32))[0])
+"""
+    ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert ended.returncode == 0, ended.stderr
+    np.testing.assert_array_equal(np.load(tmp_path / "seen.npy"), env.step(action)[0])
+
+
 def test_settings_reach_the_simulator():
     env = make(robot="husky", soil="firm_ground", radius=0.65, side="left", effects=["slope=0.05", "towed_drag=40"])
     env.reset(seed=0)
@@ -266,6 +346,23 @@ def test_radius_range_and_sides_are_drawn():
         ({"speed": 0.0}, "speed"),
         ({"speed": (0.3, 0.2)}, "low, high"),
         ({"radius": (0.7, 0.8, 0.9)}, "low, high"),
+        ({"radius": ("a", "b")}, "low, high"),
+        ({"radius": True}, "low, high"),
+        ({"radius": None}, "low, high"),
+        ({"radius": 3.0}, "headland is 3 m deep"),
+        ({"radius": (0.8, 4.0)}, "headland is 3 m deep"),
+        ({"speed": 2.6}, "at most 2.5 m/s"),
+        ({"speed": "fast"}, "low, high"),
+        ({"side": ["left"]}, "side"),
+        ({"soil": None}, "soil is None: give a name, a file, a Soil"),
+        ({"soil": 3}, "soil is 3"),
+        ({"robot": None}, "robot is None: give a name, a file, a Robot"),
+        ({"randomisation": None}, "randomisation is None: give True, False"),
+        ({"sensors": None}, "sensors is None: give a Sensors"),
+        ({"reward": 1.0}, "reward is 1.0: give a RewardWeights"),
+        ({"numerics": "fine"}, "numerics is 'fine'"),
+        ({"radious": 0.8}, "unknown argument of the environment 'radious': did you mean 'radius'"),
+        ({"sensors": Sensors(imu=Imu(sample_rate=100.0))}, "sample_rate is 100 Hz .* give 125 Hz"),
     ],
 )
 def test_bad_arguments_are_one_sentence(arguments, words):

@@ -74,6 +74,27 @@ def test_mask_resets_only_the_chosen():
     np.testing.assert_array_equal(after["_true_x"], [False, True, False])
 
 
+def test_a_seed_with_a_mask_reseeds_only_the_chosen():
+    one, two = make_native(), make_native()
+    for native in (one, two):
+        native.reset(seed=0)
+    one.reset(seed=70, options={"reset_mask": np.array([False, True, False])})
+    assert one.np_random_seed == (0, 71, 2)
+    actions = np.zeros((COUNT, 2), np.float32)
+    ours, theirs = one.step(actions)[0], two.step(actions)[0]
+    np.testing.assert_array_equal(ours[[0, 2]], theirs[[0, 2]])
+    assert (ours[1] != theirs[1]).any()
+
+
+def test_no_time_limit_is_minus_one_as_of_a_single_environment():
+    native = make_native(max_episode_steps=-1)
+    native.reset(seed=0)
+    for _ in range(330):
+        *_, truncated, _ = native.step(np.zeros((COUNT, 2), np.float32))
+        assert not truncated.any()
+    native.unwrapped.spread_time_limits()
+
+
 def test_threads_do_not_change_results():
     one, two = make_native(8), make_native(8, threads=2)
     assert_same(one.reset(seed=3)[0], two.reset(seed=3)[0])
@@ -109,7 +130,9 @@ def test_seed_list_is_taken():
         ({"autoreset_mode": "NextSteps"}, "NextStep"),
         ({"max_episode_steps": 0}, "max_episode_steps"),
         ({"threads": 0}, "threads"),
-        ({"render_mode": "human"}, "render_mode"),
+        ({"render_mode": "human"}, "render_mode is 'human': give None."),
+        ({"max_episode_steps": "all"}, "max_episode_steps is 'all'"),
+        ({"radious": 0.8}, "radius"),
     ],
 )
 def test_bad_arguments_are_one_sentence(arguments, words):

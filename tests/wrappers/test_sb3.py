@@ -1,5 +1,6 @@
 """The batch as an SB3 VecEnv."""
 
+import gymnasium
 import numpy as np
 import pytest
 
@@ -8,7 +9,9 @@ pytest.importorskip("stable_baselines3", reason="the extra rl is not installed")
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecMonitor, VecNormalize
 
+from ddagr_gym.envs.registration import TURN_ID
 from ddagr_gym.envs.turn_vector_env import TurnVectorEnv
+from ddagr_gym.errors import InputError
 from ddagr_gym.wrappers.sb3 import TurnVecEnv
 
 
@@ -46,3 +49,26 @@ def test_staggered_episodes_end_apart_and_from_then_on_take_their_time():
     ends = [np.flatnonzero(env.step(np.zeros((4, 2), np.float32))[2]).tolist() for _ in range(16)]
     assert ends[:8] == [[], [0], [], [1], [], [2], [], [3]]
     assert ends[8:] == ends[:8]
+
+
+def test_options_reach_the_batch():
+    single = gymnasium.make(TURN_ID, radius=1.2)
+    single.reset(seed=1)
+    env = TurnVecEnv(2)
+    env.reset()
+    for options in ({"episode": single.unwrapped.episode}, [{"episode": single.unwrapped.episode}] * 2):
+        env.set_options(options)
+        np.testing.assert_allclose(env.reset()[:, 8], 1.2, rtol=1e-6)
+    env.set_options([{"episode": single.unwrapped.episode}, {}])
+    with pytest.raises(InputError, match="give a single dictionary"):
+        env.reset()
+
+
+def test_what_the_batch_shares_is_set_and_called_for_all():
+    env = TurnVecEnv(3)
+    env.set_attr("max_episode_steps", 7, indices=[2, 0, 1])
+    assert env.get_attr("max_episode_steps", indices=[1]) == [7]
+    for ask in (lambda: env.set_attr("max_episode_steps", 9, indices=0), lambda: env.env_method("reset", indices=[1])):
+        with pytest.raises(InputError, match="for the whole batch: give None"):
+            ask()
+    assert env.get_attr("max_episode_steps") == [7, 7, 7]
