@@ -43,7 +43,8 @@ def implausibility(effect: Effect) -> float:
     """Half the square of how far a size is from a typical one, on a logarithmic scale; it settles ties only.
 
     A biased and a tilted accelerometer leave the same traces: 0.1 m/s^2 is an ordinary bias and hardly a tilt, 0.5
-    m/s^2 an ordinary tilt and hardly a bias.
+    m/s^2 an ordinary tilt and hardly a bias. Below the least meaningful size nobody would care about either, so that
+    all such sizes are equally unusual: else ever smaller ones would drive out what fits better.
     """
     if effect.categorical or not effect.differentiable:
         return 0.0
@@ -53,4 +54,4 @@ def implausibility(effect: Effect) -> float:
         for data in (effect.parameter(name).metadata,)
     ]
     size = math.sqrt(sum(multiple**2 for multiple in multiples))
-    return 0.5 * (math.log(max(size, 0.1) / TYPICAL_MULTIPLE) / _SPREAD) ** 2
+    return 0.5 * (math.log(max(size, 1.0) / TYPICAL_MULTIPLE) / _SPREAD) ** 2

@@ -180,8 +180,9 @@ def gains(table: Table, quantities: Sequence[str]) -> dict[str, Array]:
 def gain_share(gained: Mapping[str, Array]) -> Measured | None:
     """Share of what the ceiling gains over the refitted nominal model that the named effects gain.
 
-    None where not even the ceiling gains :data:`LEAST_EXPLAINABLE`, or where the interval of its gain holds nothing:
-    a share of what may be nothing is no number.
+    None where not even the ceiling gains :data:`LEAST_EXPLAINABLE`, or where its gain has no interval, as with a
+    single cluster of forecasts, or one that holds nothing: a share of what may be nothing is no number. No drawing
+    counts more than all of the ceiling, which is chosen over all windows.
 
     Args:
         gained: of :func:`gains`.
@@ -189,10 +190,11 @@ def gain_share(gained: Mapping[str, Array]) -> Measured | None:
     if not gained or gained["ceiling"][0] < LEAST_EXPLAINABLE:
         return None
     ceiling = _measured(gained["ceiling"]).interval
-    if ceiling is not None and ceiling[0] <= 0.0:
+    if ceiling is None or ceiling[0] <= 0.0:
         return None
     sound = gained["ceiling"] > 0.5 * LEAST_EXPLAINABLE
-    return _measured(np.where(sound, gained["corrected"] / np.where(sound, gained["ceiling"], 1.0), np.nan))
+    share = np.minimum(gained["corrected"] / np.where(sound, gained["ceiling"], 1.0), 1.0)
+    return _measured(np.where(sound, share, np.nan))
 
 
 def of_mended_readings(fit: Certificate, named: bool) -> Certificate:

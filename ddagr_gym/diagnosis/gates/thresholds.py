@@ -93,6 +93,11 @@ class Gate:
         """
         return 0.5 * (math.sqrt(2.0 * self.gain) + POWER) ** 2
 
+    @property
+    def detectable_below_least(self) -> float:
+        """The same of a size below its least meaningful one, which only an unmistakable gain names."""
+        return Gate(UNMISTAKABLE * self.gain, self.held_out).detectable
+
 
 @dataclass(frozen=True)
 class Origin:

@@ -166,13 +166,13 @@ def isolability(
     gates = chance_gates(terms) if thresholds is None else thresholds.for_length(planned.problem.covered)
     matrix = terms.reduced().information
     names = tuple(dict.fromkeys(c.name for c in terms.candidates))
-    sizes = {name: _directions(name, terms, matrix, gates.of(name).detectable) for name in names}
+    sizes = {name: _directions(name, terms, matrix, gates.of(name)) for name in names}
     share = np.full((len(names), len(names)), np.nan)
     apart = np.full((len(names), len(names)), np.nan)
     for i, row in enumerate(names):
         for j, column in enumerate(names):
             if i != j:
-                share[i, j], apart[i, j] = _pair(sizes[row], column, terms, matrix, gates.of(row).detectable)
+                share[i, j], apart[i, j] = _pair(sizes[row], column, terms, matrix)
     return Isolability(
         robot.name,
         soil_name,
@@ -213,13 +213,15 @@ class _Direction:
     size: Detectable
 
 
-def _directions(name: str, terms: Terms, matrix: Array, gate: float) -> list[_Direction]:
+def _directions(name: str, terms: Terms, matrix: Array, gate: Gate) -> list[_Direction]:
     """Probes of an effect's best-placed candidate; of limits and flips those that the table states."""
     own = [c for c in terms.candidates if c.name == name]
     absorbed = terms.absorbed.get(name, 0.0)
     found = [
         [
-            _Direction(c, column, least_multiple(c, k), detectable(c, k, float(matrix[column, column]), gate, absorbed))
+            _Direction(
+                c, column, least_multiple(c, k), detectable(c, k, float(matrix[column, column]), gate, 1.0, absorbed)
+            )
             for k, column in enumerate(c.columns)
         ]
         for c in own
@@ -249,9 +251,7 @@ def _ranks_before(item: Detectable, before: Detectable) -> bool:
     return item.multiples > before.multiples
 
 
-def _pair(
-    directions: Sequence[_Direction], rival: str, terms: Terms, matrix: Array, gate: float
-) -> tuple[float, float]:
+def _pair(directions: Sequence[_Direction], rival: str, terms: Terms, matrix: Array) -> tuple[float, float]:
     """Share that a rival cannot imitate, and multiples from which the two are told apart; the worst direction's."""
     seen = [d for d in directions if d.size.multiples <= TYPICAL_MULTIPLE]
     rivals = [c for c in terms.candidates if c.name == rival]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ddagr_gym.diagnosis.gates.thresholds import Thresholds
+from ddagr_gym.diagnosis.gates.thresholds import Gate, Thresholds
 from ddagr_gym.diagnosis.search.candidates import Candidate, moved_field
 from ddagr_gym.diagnosis.search.inner_products import Terms
 from ddagr_gym.physics.effects import Effect
@@ -49,14 +49,17 @@ def least_multiple(candidate: Candidate, k: int) -> float:
     return float(data["least"] / abs(away)) if probe.differentiable else 1.0
 
 
-def detectable(candidate: Candidate, k: int, information: float, gate: float, absorbed: float = 0.0) -> Detectable:
-    """A probe's size whose gain reaches a gate (theory: diagnosis, eq. (11)).
+def detectable(
+    candidate: Candidate, k: int, information: float, gate: Gate, dispersion: float = 1.0, absorbed: float = 0.0
+) -> Detectable:
+    """A probe's size that is named nine times in ten (theory: diagnosis, eq. (11)).
 
     Args:
         candidate: of the probe.
         k: its place in the candidate.
         information: that is left of the probe beside the nuisances.
-        gate: gain that passes.
+        gate: of the effect; a size below its least meaningful one has to be unmistakable besides.
+        dispersion: by which gains are divided.
         absorbed: size that a nuisance would take over, on top.
     """
     probe = candidate.probes[k]
@@ -66,7 +69,11 @@ def detectable(candidate: Candidate, k: int, information: float, gate: float, ab
     else:
         distance = abs(float(getattr(probe, name)) if candidate.whole is None else candidate.whole * away)
     gain = 0.5 * least_multiple(candidate, k) ** 2 * max(information, 0.0)
-    multiples = (math.sqrt(gate / gain) if gain > _NO_GAIN else math.inf) + absorbed / distance
+    passing = _multiples(gate.detectable * dispersion, gain)
+    if candidate.has_sizes:
+        below = _multiples(gate.detectable_below_least * dispersion, gain)
+        passing = max(passing, min(1.0 - absorbed / distance, below))
+    multiples = passing + absorbed / distance
     if candidate.has_sizes:
         size = distance * multiples if distance * multiples <= probe.reach(name) else math.inf
     else:  # a limit or a flip is there or not
@@ -74,8 +81,13 @@ def detectable(candidate: Candidate, k: int, information: float, gate: float, ab
     return Detectable(candidate.name, name, str(data["unit"]), distance, size, multiples)
 
 
+def _multiples(wanted: float, gain: float) -> float:
+    """Multiples of a size by which its gain becomes the wanted one."""
+    return math.sqrt(wanted / gain) if gain > _NO_GAIN else math.inf
+
+
 def least_detectable(terms: Terms, thresholds: Thresholds, dispersion: float) -> Mapping[str, dict[str, float]]:
-    """Distance of each size from neutral that passes the gate nine times in ten, by effect and field.
+    """Distance of each size from neutral that is named nine times in ten, by effect and field.
 
     Of an effect that may act at any time or in any way, the usual one counts, which is its default (a change of soil
     from the beginning on); of one that has a place, the median over the discs that the drives touch. Of a limit stands
@@ -87,9 +99,9 @@ def least_detectable(terms: Terms, thresholds: Thresholds, dispersion: float) ->
     for candidate in terms.candidates:
         if candidate.is_band:
             continue
-        gate = thresholds.of(candidate.name).detectable * dispersion
+        gate, absorbed = thresholds.of(candidate.name), terms.absorbed.get(candidate.name, 0.0)
         shown = [
-            (probe, detectable(candidate, k, float(information[candidate.columns[k]]), gate))
+            (probe, detectable(candidate, k, float(information[candidate.columns[k]]), gate, dispersion, absorbed))
             for k, probe in enumerate(candidate.probes)
         ]
         if candidate.is_direction:
@@ -97,10 +109,7 @@ def least_detectable(terms: Terms, thresholds: Thresholds, dispersion: float) ->
             shown = [max(shown, key=lambda item: item[1].size)]
         for probe, item in shown:
             found.setdefault(item.effect, {}).setdefault(item.field, []).append((candidate, probe, item.size))
-    return {
-        effect: {field: _stated(sizes) + terms.absorbed.get(effect, 0.0) for field, sizes in fields.items()}
-        for effect, fields in found.items()
-    }
+    return {effect: {field: _stated(sizes) for field, sizes in fields.items()} for effect, fields in found.items()}
 
 
 def _stated(sizes: Sequence[tuple[Candidate, Effect, float]]) -> float:

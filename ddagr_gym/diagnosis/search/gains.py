@@ -121,8 +121,15 @@ def scores(terms: Terms, gains_: Sequence[Gain]) -> dict[str, float]:
 
 
 def _fold_of(terms: Terms) -> NDArray[np.int64]:
-    """(W,) fold of each window: stretches of every recording are dealt out in turn."""
+    """(W,) fold of each window: the stretches of every recording that hold windows are dealt out in turn.
+
+    Windows of long drives are spread along them: numbered by the clock, stretches would all fall into one or two folds.
+    """
     stretch = np.floor(terms.time / _STRETCH).astype(np.int64)
+    for recording in np.unique(terms.recording):
+        own = terms.recording == recording
+        occupied, rank = np.unique(stretch[own], return_inverse=True)
+        stretch[own] = occupied[0] + rank.reshape(-1)
     return np.asarray((stretch + terms.recording) % _FOLDS)
 
 
@@ -137,14 +144,13 @@ def held_out_gains(terms: Terms, dispersion: float = 1.0) -> dict[str, float]:
     """
     fold = _fold_of(terms)
     total: dict[str, float] = {}
-    for part in range(_FOLDS):
+    parts = np.unique(fold) if np.ptp(fold) > 0 else ()
+    for part in parts:
         outside = (fold != part).astype(float)
-        if not outside.any() or outside.all():
-            continue
         reduced = terms.reduced(outside)
         inside = terms.normals[fold == part].sum(axis=0)
         for gain in gains(terms, outside):
-            change = _held_out(terms, reduced, inside, gain, 1.0 / _FOLDS)
+            change = _held_out(terms, reduced, inside, gain, 1.0 / len(parts))
             total[gain.name] = total.get(gain.name, 0.0) + change / dispersion
     return total
 

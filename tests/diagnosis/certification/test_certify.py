@@ -197,6 +197,26 @@ def test_share_of_the_ceiling() -> None:
     assert gain_share(gains(resampled(nothing, clusters, np.random.default_rng(0)), MOTION)) is None
 
 
+def test_one_cluster_says_nothing_of_a_share() -> None:
+    """No interval tells whether the ceiling gains anything."""
+    one = np.zeros(4, dtype=np.int64)
+    errors = {"refitted": {"yaw_rate": np.ones(4)}, "corrected": {"yaw_rate": np.full(4, 1.3)}}
+    errors["flexible"] = {"yaw_rate": np.full(4, 0.8)}
+    assert gain_share(gains(resampled(errors, one, np.random.default_rng(0)), MOTION)) is None
+
+
+def test_no_share_is_more_than_all() -> None:
+    """The ceiling is chosen over all windows; in some drawings the corrected model is better than it."""
+    rng, clusters = np.random.default_rng(1), np.repeat(np.arange(12), 5)
+    base = rng.normal(size=60)
+    errors = {"refitted": base, "corrected": 0.5 * rng.normal(size=60), "flexible": 0.45 * rng.normal(size=60)}
+    table = resampled({name: {"yaw_rate": values} for name, values in errors.items()}, clusters, rng)
+    share = gain_share(gains(table, MOTION))
+    assert share is not None
+    assert share.interval is not None
+    assert share.interval[1] == 1.0
+
+
 def test_intervals_of_few_clusters_are_wide_enough() -> None:
     """Of 90 % intervals from three drives eight in ten hold the true error; plain resampling has 57 %."""
     rng, clusters = np.random.default_rng(3), np.repeat(np.arange(3), 8)

@@ -57,6 +57,13 @@ def test_size_settles_ties() -> None:
     assert large["imu_tilt"] > 0.6
 
 
+def test_sizes_below_the_least_that_matters_are_equally_unusual() -> None:
+    """A tenth or a hundredth of it: the one that fits better by half a unit of cost leads."""
+    cost = np.full(30, 10.0)
+    small, smaller = rival("gyro_scale=1.001", cost + 0.5 / 30.0), rival("imu_misalignment=0.000349", cost)
+    assert weights(smaller, small) == pytest.approx({"imu_misalignment": 0.62, "gyro_scale": 0.38}, abs=0.01)
+
+
 def test_what_a_form_may_cost_keeps_a_rival_of_a_strong_effect() -> None:
     cost, worse = np.full(30, 10.0), np.full(30, 11.0)
     weak = weights(rival("gyro_scale=1.05", cost, gain=60.0), rival("imu_misalignment=0.1745", worse))

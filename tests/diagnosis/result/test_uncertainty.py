@@ -7,7 +7,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from ddagr_gym.diagnosis.gates.thresholds import Gate, Thresholds
+from ddagr_gym.diagnosis.gates.thresholds import UNMISTAKABLE, Gate, Thresholds
 from ddagr_gym.diagnosis.result.detectable import least_detectable
 from ddagr_gym.diagnosis.result.uncertainty import (
     FORM,
@@ -22,7 +22,7 @@ from ddagr_gym.diagnosis.search.inner_products import Terms
 from ddagr_gym.identification.gauss_newton import fit
 from ddagr_gym.identification.nuisances import NuisancePriors, absorbed_sizes, nuisances
 from ddagr_gym.identification.size_prior import size_scale
-from ddagr_gym.physics.effects import effect_kind, parse_effect
+from ddagr_gym.physics.effects import Effect, effect_kind, parse_effect
 from ddagr_gym.physics.effects.base import DriveExtent
 from ddagr_gym.presets import get_robot
 
@@ -90,9 +90,27 @@ def least_of(
     return least_detectable(terms, Thresholds({name: Gate(GATE, 0.0)}, {}, 20, "a test"), DISPERSION)[name]
 
 
-def reaching(step: float, information: float) -> float:
+def reaching(step: float, information: float, gate: float = GATE) -> float:
     """Size whose score over the root of the dispersion stands 1.28 above what passes the gate."""
-    return step * math.sqrt(DISPERSION / information) * (math.sqrt(2.0 * GATE) + 1.2816)
+    return step * math.sqrt(DISPERSION / information) * (math.sqrt(2.0 * gate) + 1.2816)
+
+
+def named(kind: type[Effect], field: str, information: float) -> float:
+    """Size that is named: at the gate, and meaningful or unmistakable."""
+    data = kind.parameter(field).metadata
+    unmistakable = reaching(data["step"], information, UNMISTAKABLE * GATE)
+    return max(reaching(data["step"], information), min(data["least"], unmistakable))
+
+
+def test_a_size_below_its_least_meaningful_one_has_to_be_unmistakable() -> None:
+    """0.05 m/s^2 is a bias that matters: shown from 0.01 or 0.04 on, it is named from three times the gate or 0.05."""
+    kind = effect_kind("accelerometer_bias")
+    data = kind.parameter("x").metadata
+    for shown in (0.01, 0.04, 0.2):
+        information = (reaching(data["step"], 1.0) / shown) ** 2
+        tripled = shown * (math.sqrt(6.0 * GATE) + 1.2816) / (math.sqrt(2.0 * GATE) + 1.2816)
+        expected = {0.01: tripled, 0.04: data["least"], 0.2: 0.2}[shown]
+        assert least_of(candidates_of(kind, EXTENT, 0), {0: information})["x"] == pytest.approx(expected)
 
 
 def test_a_change_that_may_begin_at_any_time_counts_from_the_beginning_on() -> None:
@@ -104,8 +122,9 @@ def test_a_change_that_may_begin_at_any_time_counts_from_the_beginning_on() -> N
     information = {column: 1e4 for candidate in candidates for column in candidate.columns}
     strength, stiffness = candidates[whole].columns
     least = least_of(candidates, information | {strength: 400.0, stiffness: 100.0})
-    steps = [kind.parameter(name).metadata["step"] for name in ("strength", "stiffness")]
-    assert least == pytest.approx({"strength": reaching(steps[0], 400.0), "stiffness": reaching(steps[1], 100.0)})
+    assert least == pytest.approx(
+        {"strength": named(kind, "strength", 400.0), "stiffness": named(kind, "stiffness", 100.0)}
+    )
 
 
 def test_of_places_the_median_counts_of_those_that_were_driven_over() -> None:
@@ -114,23 +133,21 @@ def test_of_places_the_median_counts_of_those_that_were_driven_over() -> None:
     driven = candidates[2:5]
     information = {c.columns[0]: value for c, value in zip(driven, (100.0, 400.0, 1e6), strict=True)}
     least = least_of(candidates, information)
-    assert least["strength"] == pytest.approx(reaching(kind.parameter("strength").metadata["step"], 400.0))
+    assert least["strength"] == pytest.approx(named(kind, "strength", 400.0))
     assert least["stiffness"] == np.inf
 
 
 def test_of_two_directions_the_one_that_shows_worst_counts() -> None:
     kind = effect_kind("slope")
-    step = kind.parameter("angle").metadata["step"]
     for information in ({0: 100.0, 1: 900.0}, {0: 900.0, 1: 100.0}):
         least = least_of(candidates_of(kind, EXTENT, 0), information)
-        assert least == {"angle": pytest.approx(reaching(step, 100.0))}
+        assert least == {"angle": pytest.approx(named(kind, "angle", 100.0))}
 
 
 def test_of_two_ways_to_act_the_usual_one_counts() -> None:
     kind = effect_kind("motor_droop")
-    step, recovery = (kind.parameter(name).metadata["step"] for name in ("droop", "recovery"))
     least = least_of(candidates_of(kind, EXTENT, 0), {0: 900.0, 1: 400.0, 2: 100.0})
-    expected = {"droop": reaching(step, 900.0), "recovery": reaching(recovery, 400.0)}
+    expected = {"droop": named(kind, "droop", 900.0), "recovery": named(kind, "recovery", 400.0)}
     assert least == pytest.approx(expected)
 
 
@@ -174,7 +191,8 @@ def test_what_a_nuisance_would_take_over_comes_on_top() -> None:
     assert absorbed_sizes(late, values) == {"command_delay": pytest.approx(0.025)}
     candidates = candidates_of(effect_kind("command_delay"), EXTENT, 0)
     every = {column: 1e4 for candidate in candidates for column in candidate.columns}
-    bare = least_of(candidates, every)["delay"]
+    bare = reaching(effect_kind("command_delay").parameter("delay").metadata["step"], 1e4)
+    # all of it together is more than the least meaningful delay of 0.02 s
     assert least_of(candidates, every, absorbed={"command_delay": 0.025})["delay"] == pytest.approx(bare + 0.025)
 
 
