@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from ddagr_gym.diagnosis.answer.certificate import Certificate
 from ddagr_gym.diagnosis.answer.location import EffectLocation, Localisation
-from ddagr_gym.diagnosis.answer.verdict import NONE, UNKNOWN, DataDoubt, Diagnosis
+from ddagr_gym.diagnosis.answer.verdict import NONE, UNKNOWN, DataDoubt, Diagnosis, IncompleteFor
 from ddagr_gym.diagnosis.certification.certificate import worse_on_unseen
 from ddagr_gym.diagnosis.localisation.operating_condition_words import uneven_phrase
 from ddagr_gym.diagnosis.preprocessing.data_checks import dead_channels, suspects_of
@@ -51,15 +51,23 @@ def review(
     findings = tuple(replace(f, where=places.get(f.name)) for f in diagnosis.findings)
     nameless = diagnosis.verdict in ((NONE,), (UNKNOWN,))
     dead = dead_channels(checks)
-    doubts = [] if nameless else _doubts_of_names(replace(diagnosis, findings=findings), places, fit)
-    doubts += [dead_in_words(dead)] if dead else []
+    of_names = [] if nameless else _doubts_of_names(replace(diagnosis, findings=findings), places, fit)
+    doubts = [*of_names, dead_in_words(dead)] if dead else of_names
     # what was seen in the values is mended in all models: its share is not known
     share = located.explained if any(f.gate > 0.0 for f in findings) else None
     whole = diagnosis.complete and (share is None or share >= WHOLE)
     suspects = suspects_of(checks) if nameless else ()
     remarks = [suspects_in_words(suspects)] if suspects else []
-    sentence = headline(diagnosis.verdict, whole, findings, share, [*doubts, *remarks])
-    return replace(diagnosis, findings=findings, complete=whole and not doubts, sentence=sentence)
+    reasons = _reasons(whole, bool(of_names), bool(dead))
+    sentence = headline(diagnosis.verdict, whole, findings, share, [*doubts, *remarks], silent=not of_names)
+    return replace(diagnosis, findings=findings, complete=not reasons, sentence=sentence, incomplete_for=reasons)
+
+
+def _reasons(whole: bool, doubtful: bool, dead: bool) -> tuple[IncompleteFor, ...]:
+    """Why an answer is not complete, what is left first; empty where it is."""
+    left: tuple[IncompleteFor, ...] = () if whole else ("left",)
+    names: tuple[IncompleteFor, ...] = ("names",) if doubtful else ()
+    return (*left, *names, "dead") if dead else (*left, *names)
 
 
 def with_dead_channels(diagnosis: Diagnosis, checks: Sequence[DataDoubt]) -> Diagnosis:
@@ -73,7 +81,8 @@ def with_dead_channels(diagnosis: Diagnosis, checks: Sequence[DataDoubt]) -> Dia
     if not dead:
         return diagnosis
     said = dead_in_words(dead)
-    return replace(diagnosis, complete=False, sentence=f"{diagnosis.sentence} {said[0].upper()}{said[1:]}.")
+    sentence = f"{diagnosis.sentence} {said[0].upper()}{said[1:]}: the answer is that of the other channels."
+    return diagnosis.doubted("dead", sentence)
 
 
 def _doubts_of_names(diagnosis: Diagnosis, places: Mapping[str, EffectLocation], fit: Certificate | None) -> list[str]:

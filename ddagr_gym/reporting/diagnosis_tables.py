@@ -11,7 +11,7 @@ from ddagr_gym.diagnosis.answer.certificate import Certificate, Measured
 from ddagr_gym.diagnosis.answer.location import Localisation, OperatingConditionShare, Span
 from ddagr_gym.diagnosis.answer.next_drive_plan import NextDrivePlan
 from ddagr_gym.diagnosis.answer.unnamed_terms import UnnamedTerm, UnnamedTerms
-from ddagr_gym.diagnosis.answer.verdict import NONE, UNKNOWN, DataDoubt, Diagnosis, Finding, GatesUsed
+from ddagr_gym.diagnosis.answer.verdict import NONE, UNKNOWN, DataDoubt, Diagnosis, Finding, GatesUsed, IncompleteFor
 from ddagr_gym.diagnosis.result.sentences import when
 from ddagr_gym.diagnosis.result.soil_words import finding_in_words
 from ddagr_gym.diagnosis.wording import CHANNEL_NAMES, in_sentence, range_in_words, title
@@ -38,6 +38,14 @@ _NULLS = {
 }
 
 
+_INCOMPLETE: Mapping[IncompleteFor, str] = {
+    "left": "something is left",
+    "names": "nothing else shows, but what is named is doubtful",
+    "dead": "not every channel speaks",
+    "contradictions": "the recordings contradict themselves",
+}
+
+
 def _of_drive(diagnosis: Diagnosis, seconds: float) -> str:
     """What the time that windows cover is of: of long drives they are some."""
     total, recordings = sum(item.seconds for item in diagnosis.data), _recordings(len(diagnosis.recordings))
@@ -60,8 +68,7 @@ def tiles(diagnosis: Diagnosis, seconds: float) -> list[dict[str, str]]:
     parts = () if diagnosis.drivetrain is None else diagnosis.drivetrain.names
     names = [title(name) if name not in (NONE, UNKNOWN) else name for name in diagnosis.verdict if name not in parts]
     verdict = ", ".join(["Drivetrain", *names] if parts else names)
-    left = "something is left" if diagnosis.verdict != (NONE,) else "not every channel speaks"
-    status = "complete: nothing else shows" if diagnosis.complete else f"incomplete: {left}"
+    status = "complete: nothing else shows" if diagnosis.complete else f"incomplete: {_incomplete(diagnosis)}"
     explained = None if diagnosis.localisation is None else diagnosis.localisation.explained
     shares = [] if diagnosis.fit is None else _gain_shares(diagnosis.fit)
     found = [
@@ -78,6 +85,13 @@ def tiles(diagnosis: Diagnosis, seconds: float) -> list[dict[str, str]]:
         label = f"of what is explicable where no size was fitted, {horizon:g} s ahead"
         found.insert(2, {"value": percent(share.value), "label": label})
     return found
+
+
+def _incomplete(diagnosis: Diagnosis) -> str:
+    """The first reason why an answer is not complete, in words."""
+    if diagnosis.incomplete_for:
+        return _INCOMPLETE[diagnosis.incomplete_for[0]]
+    return "something is left" if diagnosis.verdict != (NONE,) else "the recordings are in doubt"
 
 
 def _recordings(count: int) -> str:
@@ -129,8 +143,8 @@ def rejected(items: Sequence[Finding]) -> list[dict[str, str]]:
 
 
 def _evidence(finding: Finding) -> str:
-    if finding.gain == finding.gate == 0.0:
-        return "seen in the values"
+    if finding.gate == 0.0:
+        return _seen(finding)
     if finding.by_forecasts:
         growth, gate = (f"{100.0 * value:.1f} %" for value in (finding.gain, finding.gate))
         return f"forecasts of what was left out are worse by {growth} without it, at least {gate} is asked for"
@@ -142,6 +156,15 @@ def _evidence(finding: Finding) -> str:
     if finding.calibrated_p is not None:
         parts.append(f"p = {number(finding.calibrated_p, 2)} against the null drives")
     return ", ".join(parts)
+
+
+def _seen(finding: Finding) -> str:
+    """Evidence of what the values themselves show: no window was left out for it."""
+    if finding.name == "sensor_hold":
+        return f"seen in the values: {finding.gain:.0f} readings are repeats"
+    if finding.score > 0.0:
+        return f"seen in the values, {number(finding.score, 2)} standard errors beyond doubt"
+    return "seen in the values"
 
 
 def _spans(spans: Sequence[Span], recordings: Sequence[str]) -> str:

@@ -7,8 +7,10 @@ import pytest
 from ddagr_gym.diagnosis.answer.certificate import Certificate, Gains, Measured
 from ddagr_gym.diagnosis.answer.location import EffectLocation, Localisation, Unevenness
 from ddagr_gym.diagnosis.answer.verdict import DataDoubt, Diagnosis, Estimate, Finding, GatesUsed
+from ddagr_gym.diagnosis.result.channel_fault_findings import with_contradictions
 from ddagr_gym.diagnosis.result.files import as_mapping, validate
 from ddagr_gym.diagnosis.review import review, with_dead_channels
+from ddagr_gym.recordings.checks.findings import CheckFinding, Status
 
 MISFIT = {"yaw_rate": 4.0}
 BANK = GatesUsed(nulls=60, bank="f", level=0.05)
@@ -24,6 +26,11 @@ def where(uneven: Unevenness | None = None) -> EffectLocation:
     return EffectLocation((), 0.0, (), (), uneven, "everywhere")
 
 
+def made_of(dead: str) -> tuple[DataDoubt, ...]:
+    """Checks of a recording with a dead channel."""
+    return (DataDoubt("a.csv", dead, "stuck", "It never changes."),)
+
+
 def located(explained: float | None = 1.0, **findings: EffectLocation) -> Localisation:
     return Localisation({}, explained, where(), where(), findings, ())
 
@@ -34,7 +41,9 @@ def test_a_size_that_is_not_the_same_everywhere_is_said_and_leaves_the_answer_in
     made = review(diagnosis("command_delay", "delay", 0.1, complete), located(command_delay=uneven))
     assert not made.complete
     assert "the size of command delay is not the same everywhere: 1.5 of the fitted one" in made.sentence
-    assert made.sentence.endswith("above what these data can show." if complete else "that has no name here.")
+    assert made.sentence.endswith("; nothing else was found, but what is named is doubtful.") == complete
+    assert made.sentence.endswith("that has no name here.") != complete
+    assert made.incomplete_for == (("names",) if complete else ("left", "names"))
 
 
 def test_an_even_size_changes_nothing() -> None:
@@ -105,9 +114,32 @@ def test_what_is_seen_in_the_values_has_no_share_of_the_mismatch() -> None:
 def test_a_dead_channel_leaves_no_answer_complete() -> None:
     given = replace(diagnosis("command_delay", "delay", 0.1), sentence="The commands come late.")
     assert with_dead_channels(given, ()) is given
-    made = with_dead_channels(given, (DataDoubt("a.csv", "yaw_rate", "stuck", "It never changes."),))
+    made = with_dead_channels(given, made_of("yaw_rate"))
     assert not made.complete
     assert made.sentence.startswith("The commands come late. Yaw rate never changes")
+    assert made.sentence.endswith(": the answer is that of the other channels.")
+    assert made.incomplete_for == ("dead",)
+    assert with_dead_channels(replace(given, complete=False), made_of("yaw_rate")).incomplete_for == ("left", "dead")
+
+
+def test_a_dead_channel_makes_no_name_doubtful() -> None:
+    """The other channels hold nothing else; where nothing is named not every channel has said so."""
+    made = review(diagnosis("command_delay", "delay", 0.1), located(), checks=made_of("yaw_rate"))
+    assert not made.complete
+    assert made.incomplete_for == ("dead",)
+    assert made.sentence.endswith("; nothing else above what the other channels can show.")
+    nothing = replace(diagnosis("slope", "angle", 0.1), verdict=("none",), findings=())
+    assert review(nothing, located(), checks=made_of("yaw_rate")).incomplete_for == ("dead",)
+
+
+def test_contradictions_and_something_left_are_both_kept() -> None:
+    finding = CheckFinding("turning", "gyro", Status.SUSPICIOUS, meaning="Gyro and poses differ.")
+    complete, open_ = (
+        with_contradictions(diagnosis("slope", "angle", 0.1, whole), [finding]) for whole in (True, False)
+    )
+    assert complete.incomplete_for == ("contradictions",)
+    assert open_.incomplete_for == ("left", "contradictions")
+    validate(as_mapping(open_))
 
 
 def test_without_a_name_the_sentence_has_what_the_recordings_own_checks_suspect() -> None:

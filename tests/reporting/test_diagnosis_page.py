@@ -9,6 +9,8 @@ import pytest
 
 from ddagr_gym import simulate
 from ddagr_gym.diagnosis.answer.verdict import DataDoubt, GatesUsed
+from ddagr_gym.diagnosis.preprocessing.repeated_readings import RepeatedReadings
+from ddagr_gym.diagnosis.result.channel_fault_findings import repeat_findings
 from ddagr_gym.physics.effects.registry import effect_kinds
 from ddagr_gym.reporting.diagnosis_figures import MOST_BARS, MOST_POINTS, _bars, channel_figure, thinned
 from ddagr_gym.reporting.diagnosis_page import PAGE, PICTURES, _Studio, write_report
@@ -219,7 +221,7 @@ def test_many_doubts_are_folded_and_none_is_lost(words_alone):
         {"recording": "a.csv", "channel": f"c{number}", "finding": "wait", "sentence": "It waits.", "suspects": []}
         for number in range(9)
     ]
-    bare = diagnosis(findings=[], verdict=["none"], complete=False, checks=doubts)
+    bare = diagnosis(findings=[], verdict=["none"], complete=False, checks=doubts, incomplete_for=["dead"])
     text = words_alone(bare, evidence())
     folded = text[text.index("<summary>3 more</summary>") :]
     assert all(f"<b>a.csv, c{number}:</b>" in text for number in range(9))
@@ -315,6 +317,29 @@ def test_tables_by_hand():
     assert fit_table(diagnosis(**later_entries()).fit)["rows"][1][:2] == ["yaw rate after 30 s [rad/s]", "–"]
     labels = [tile["label"] for tile in tiles(diagnosis(complete=False), 24.0)]
     assert labels[0] == "incomplete: something is left"
+
+
+@pytest.mark.parametrize(
+    ("verdict", "reasons", "words"),
+    [
+        ("slope", ["names"], "nothing else shows, but what is named is doubtful"),
+        ("slope", ["left", "names"], "something is left"),
+        ("none", ["contradictions"], "the recordings contradict themselves"),
+        ("none", [], "the recordings are in doubt"),
+    ],
+)
+def test_the_first_tile_says_why_an_answer_is_not_complete(verdict, reasons, words):
+    findings = {} if verdict == "slope" else {"findings": []}
+    found = diagnosis(verdict=[verdict], complete=False, incomplete_for=reasons, **findings)
+    assert tiles(found, 24.0)[0]["label"] == f"incomplete: {words}"
+
+
+def test_held_readings_are_seen_in_the_values_and_in_no_window():
+    (held,) = repeat_findings([RepeatedReadings("gyro", 0.5, 0.1, 4000)])
+    assert finding_card(held, ["a"])["evidence"] == "seen in the values: 2000 readings are repeats"
+    (finding,) = diagnosis().findings
+    turned = replace(finding, name="gyro_sign", gate=0.0, parameters={}, equivalence_set={})
+    assert "windows" not in finding_card(turned, ["a"])["evidence"]
 
 
 def test_limits_and_signs_are_said_in_their_own_words() -> None:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Literal
 
 from ddagr_gym.diagnosis.answer.certificate import Certificate
 from ddagr_gym.diagnosis.answer.change import Change
@@ -20,6 +21,9 @@ SCHEMA = "ddagr-diagnosis/4"
 
 NONE = "none"
 UNKNOWN = "unknown"
+
+IncompleteFor = Literal["left", "names", "dead", "contradictions"]
+"""Why an answer is not complete."""
 
 
 @dataclass(frozen=True)
@@ -237,6 +241,10 @@ class Diagnosis:
             probability over the whole library, `detectable` is the least detectable change, `misfit` has no limit,
             and `complete` says that nothing else is out of the ordinary.
         nuisance_spread: how sure the nuisances are; absent with `--calibration` and in files of before.
+        incomplete_for: why it is not `complete`: `left` (more is left that has no name), `names` (what is named is
+            doubtful), `dead` (a channel never changes), `contradictions` (sources of one motion contradict each other);
+            empty where it is, and where only something is left in a comparison, beside a drivetrain or in files of
+            before.
     """
 
     verdict: tuple[str, ...]
@@ -265,3 +273,14 @@ class Diagnosis:
     schema: str = SCHEMA
     change: Change | None = None
     nuisance_spread: NuisanceSpread | None = None
+    incomplete_for: tuple[IncompleteFor, ...] = ()
+
+    def doubted(self, reason: IncompleteFor, sentence: str) -> Diagnosis:
+        """The same, not complete for a further reason.
+
+        Args:
+            reason: why.
+            sentence: the answer in words, with the reason.
+        """
+        before: tuple[IncompleteFor, ...] = () if self.complete else self.incomplete_for or ("left",)
+        return replace(self, complete=False, sentence=sentence, incomplete_for=(*before, reason))

@@ -92,7 +92,7 @@ def with_contradictions(diagnosis: Diagnosis, contradictions: Sequence[CheckFind
         f"The recordings contradict themselves, and no name is sure before that is mended: {' '.join(said)} "
         f"As they are: {diagnosis.sentence}"
     )
-    return replace(diagnosis, complete=False, sentence=sentence)
+    return diagnosis.doubted("contradictions", sentence)
 
 
 def unexplained(contradictions: Sequence[CheckFinding], verdict: Sequence[str]) -> tuple[CheckFinding, ...]:

@@ -23,8 +23,8 @@ _ABSENT_WHERE_UNKNOWN = ("options", "thresholds")
 """Entries whose own entries are left out instead of null."""
 
 
-_ABSENT_WHERE_NOT_ASKED = ("drivetrain", "change", "nuisance_spread")
-"""Entries that are left out instead of null: files of before have none."""
+_ABSENT_WHERE_NOT_ASKED = ("drivetrain", "change", "nuisance_spread", "incomplete_for")
+"""Entries that are left out instead of null or empty: files of before have none."""
 
 
 _FINDINGS = ("findings", "rejected")
@@ -41,7 +41,9 @@ def as_mapping(diagnosis: Diagnosis) -> dict[str, Any]:
         mapping[name] = {key: value for key, value in mapping[name].items() if value is not None}
     for name in _FINDINGS:
         mapping[name] = [_without_null(item) for item in mapping[name]]
-    return {name: value for name, value in mapping.items() if value is not None or name not in _ABSENT_WHERE_NOT_ASKED}
+    return {
+        name: value for name, value in mapping.items() if value not in (None, []) or name not in _ABSENT_WHERE_NOT_ASKED
+    }
 
 
 def _without_null(finding: Mapping[str, Any]) -> dict[str, Any]:

@@ -24,6 +24,7 @@ def headline(
     findings: Sequence[Finding],
     misfit_share: float | None = None,
     doubts: Sequence[str] = (),
+    silent: bool = False,
 ) -> str:
     """What is missing, how big, how much of the mismatch that is, and whether more is left.
 
@@ -33,6 +34,7 @@ def headline(
         findings: one per name.
         misfit_share: share of the mismatch above the noise that the findings explain (0 to 1), None where unknown.
         doubts: what speaks against it or is not of one size everywhere, in words.
+        silent: whether that is only of channels that say nothing, and nothing speaks against the names.
     """
     if tuple(verdict) == (NONE,):
         return "; ".join(["Nothing is missing that these recordings can show", *doubts]) + "."
@@ -40,7 +42,7 @@ def headline(
         return "; ".join(["Something is missing that no effect of the library explains", *doubts]) + "."
     found = _joined([finding_in_words(item) + when(item) + _rivals(item) for item in findings])
     share = "" if misfit_share is None else f"; {share_in_words(misfit_share)} of the mismatch"
-    return "; ".join([f"{found[:1].upper()}{found[1:]}{share}", *doubts, _rest(complete)]) + "."
+    return "; ".join([f"{found[:1].upper()}{found[1:]}{share}", *doubts, _rest(complete, bool(doubts), silent)]) + "."
 
 
 def drivetrain_headline(parts: Sequence[str], findings: Sequence[Finding], explained: float, complete: bool) -> str:
@@ -60,8 +62,19 @@ def drivetrain_headline(parts: Sequence[str], findings: Sequence[Finding], expla
     return f"{found[:1].upper()}{found[1:]}; {worth}; {_rest(complete)}."
 
 
-def _rest(complete: bool) -> str:
-    return "nothing else above what these data can show" if complete else "something more is left that has no name here"
+def _rest(complete: bool, doubtful: bool = False, silent: bool = False) -> str:
+    """Whether more is left, or, where nothing is, what is doubted nevertheless.
+
+    Args:
+        complete: whether nothing is left.
+        doubtful: whether there are doubts.
+        silent: whether these are only of channels that say nothing.
+    """
+    if not complete:
+        return "something more is left that has no name here"
+    if doubtful and not silent:
+        return "nothing else was found, but what is named is doubtful"
+    return f"nothing else above what {'the other channels' if doubtful else 'these data'} can show"
 
 
 def change_headline(verdict: Sequence[str], complete: bool, findings: Sequence[Finding], change: Change) -> str:
@@ -81,7 +94,7 @@ def change_headline(verdict: Sequence[str], complete: bool, findings: Sequence[F
         power = f"{100.0 * change.power:.0f} times in 100"
         shown = f"the table says of each effect which change would have been found {power}"
         return (
-            f"This drive shows no change against {drives}.{nearest_in_words(change)} Smaller changes may be there: "
+            f"No change shows against {drives}.{nearest_in_words(change)} Smaller changes may be there: "
             f"{shown}{blind}{ground}."
         )
     if tuple(verdict) == (UNKNOWN,):

@@ -45,7 +45,7 @@ def test_the_headline_says_where_a_size_is_another_one():
     sentence = headline(("slope",), True, [finding("slope", **SLOPE)], 0.71, [uneven])
     assert sentence.endswith(
         "; 71 % of the mismatch; the size of sloping ground is not the same everywhere: 1.4 of the fitted one at "
-        "speeds above 0.50 m/s, 0.80 elsewhere; nothing else above what these data can show."
+        "speeds above 0.50 m/s, 0.80 elsewhere; nothing else was found, but what is named is doubtful."
     )
 
 
