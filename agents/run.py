@@ -119,12 +119,16 @@ class Training:
             "steps": model.num_timesteps,
             "cpu_seconds": round(course.seconds(), 1),
             "digest": self.settings.digest(),
-            "validation": self.validate(model, normalise).summary(),
+            "validation": {**self.validate(model, normalise).summary(), "robot": self._judged_on()},
             "course": course.history,
         }
         write_text(self.folder / RESULT, json.dumps(result, indent=1))
         self.report(course_of(result)[-1])
         return result
+
+    def _judged_on(self) -> str:
+        """Names of the robots of the validation turns, which may be others than the trained one."""
+        return ", ".join(sorted({episode.robot.name for _, episode in self.validation}))
 
     def validate(self, model: BaseAlgorithm, normalise: VecNormalize) -> ValidationResult:
         """Drive the validation scenarios without exploration."""
@@ -216,12 +220,14 @@ def validation_episodes(count: int | None = None) -> Episodes:
 
 
 def describe(found: dict[str, Any]) -> str:
-    """A validation's summary as a phrase."""
+    """A validation's summary as a phrase, with the robot that made its turns where that was kept."""
     median, worst = (
         "none" if found[f"radius_error_{name}"] is None else f"{100 * found[f'radius_error_{name}']:.2f} %"
         for name in ("median", "p95")
     )
-    return f"median |e_R| {median}, 95th percentile {worst}, success {100 * found['success_rate']:.0f} %"
+    turned_by = f" (turns of the robot {found['robot']})" if found.get("robot") else ""
+    success = f"success {100 * found['success_rate']:.0f} %"
+    return f"median |e_R| {median}, 95th percentile {worst}, {success}{turned_by}"
 
 
 def one_thread() -> None:

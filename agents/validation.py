@@ -16,7 +16,7 @@ from ddagr_gym.envs import turn_kernel as kernel
 from ddagr_gym.envs.constants import EPISODE_STEPS
 from ddagr_gym.envs.settings import Episode, TurnSettings
 from ddagr_gym.envs.turn_batch import TurnBatch
-from ddagr_gym.evaluation.metrics import exit_state, turn_radius_error
+from ddagr_gym.evaluation.metrics import TurnStatus, exit_state, turn_radius_error
 from ddagr_gym.policies.design import PolicyDesign
 from ddagr_gym.policies.view import PolicyView
 
@@ -30,7 +30,7 @@ class ValidationResult:
     """What became of each scenario.
 
     Attributes:
-        errors: (N,) e_R [-], infinite where the turn has no radius.
+        errors: (N,) e_R [-], infinite where the turn has no radius or was not made to 150 degrees.
         heading_errors: (N,) arc length over heading change against R* in the same window [-], likewise. It leaves out
             the sideslip, which changes along a turn on uneven soil and which a robot without a receiver cannot see:
             what is left is what control can do something about.
@@ -107,7 +107,7 @@ def _judge(track: Array, episode: Episode) -> tuple[float, float, bool]:
     end = len(t) if leave is None else int(np.searchsorted(t, leave.time)) + 1
     radius = turn_radius_error(x[:end], y[:end], yaw[:end], turn.radius, turn.side)
     fits = leave is not None and wheels_fit_furrow(leave.lateral_error, leave.heading_error, half_wheelbase)
-    if radius.error is None:
+    if radius.error is None or radius.status is not TurnStatus.COMPLETE:
         return np.inf, np.inf, fits
     return radius.error, _heading_radius(x[:end], y[:end], yaw[:end], turn) / turn.radius - 1.0, fits
 

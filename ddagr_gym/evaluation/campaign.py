@@ -27,7 +27,7 @@ from ddagr_gym.evaluation.controllers import (
 )
 from ddagr_gym.evaluation.dataset import IDENTITY, EpisodeDataset, Key, episode_key
 from ddagr_gym.evaluation.estimator_metrics import estimator_errors
-from ddagr_gym.evaluation.metrics import turn_metrics
+from ddagr_gym.evaluation.metrics import TurnStatus, turn_metrics
 from ddagr_gym.evaluation.policy_seeds import one_arm_each
 from ddagr_gym.evaluation.runs import TurnRun, drive_turn, drive_turns
 from ddagr_gym.evaluation.scenarios import Scenario, load_scenarios, set_hash
@@ -137,7 +137,8 @@ def episode_row(controller: str, scenario: Scenario, run: TurnRun) -> dict[str, 
         "side": episode.turn.side,
         "ending": run.ending,
         "status": turn.status.name,
-        "radius_error": turn.error,
+        # of a part of the turn it says nothing about the whole: it failed
+        "radius_error": turn.error if turn.status is TurnStatus.COMPLETE else None,
         "fit_residual": turn.residual,
         "radius_disagreement": turn.disagreement,
         "radius_consistent": turn.consistent,

@@ -12,9 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.control.row_turn import RowTurn
+from ddagr_gym.evaluation.metrics import TurnStatus
 
 Array = NDArray[np.float64]
 Row = Mapping[str, Any]
+
+_COMPLETE = TurnStatus.COMPLETE.name
 
 PREFERRED_SETS = ("S1", "V", "S0")
 """The first of these that was driven answers the page's question."""
@@ -178,9 +181,10 @@ def arm_name(row: Row) -> str:
 
 
 def size_of(row: Row) -> float:
-    """|e_R| of an episode, infinite where the radius is undefined."""
+    """|e_R| of an episode, infinite where the radius is undefined or comes from a part of the turn only."""
     error = row["radius_error"]
-    return float("inf") if error is None else abs(float(error))
+    whole = row.get("status", _COMPLETE) == _COMPLETE
+    return abs(float(error)) if whole and error is not None else float("inf")
 
 
 def badness(row: Row) -> tuple[bool, float]:

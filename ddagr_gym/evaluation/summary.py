@@ -148,7 +148,7 @@ def summarise(rows: Rows) -> dict[str, Any]:
         "runs": len({row.get("run", 0) for row in rows}),
         "infeasible": len({row["number"] for row in left_out}),
         "infeasible_but_made": sum(bool(row["success"]) for row in left_out),
-        "undefined_radius": sum(row["radius_error"] is None for row in feasible),
+        "undefined_radius": sum(math.isinf(size_of(row)) for row in feasible),
         "inconsistent_radius": sum(not row["radius_consistent"] for row in feasible),
     }
     return summary | _metrics(_Table(feasible)) if feasible else summary
@@ -162,7 +162,7 @@ def _metrics(table: _Table) -> dict[str, Any]:
         "radius_error_p95": _interval(errors, _quantile(0.95)),
         "radius_error_iqm": _interval(errors, interquartile_mean, resampling),
     }
-    signed = [row["radius_error"] for row in rows if row["radius_error"] is not None]
+    signed = [row["radius_error"] for row in rows if math.isfinite(size_of(row))]
     if signed:
         found["radius_error_signed_median"] = _interval(np.array([signed]), _quantile(0.5))
     found["success_rate"] = table.share("success")

@@ -24,7 +24,7 @@ from agents.run import CHECKPOINT, POLICY, make_environment, train
 from agents.settings import PpoSettings, SacSettings, TrainingSettings
 from agents.train_ppo import make_ppo
 from agents.train_sac import make_sac
-from agents.validation import ValidationResult, drive_all
+from agents.validation import ValidationResult, _judge, drive_all
 from ddagr_gym.config import config_names, dump_config
 from ddagr_gym.envs.calibrated_draws import EFFECTS, CalibratedDraws, GroundDraws
 from ddagr_gym.envs.calibrated_draws import NAME as DRAWS
@@ -111,6 +111,17 @@ def test_what_has_ended_is_not_trained_again(tmp_path, monkeypatch):
     assert [entry["steps"] for entry in result["course"]] == [0]
     assert {"radius_error_median", "radius_error_p95", "success_rate"} < set(result["validation"])
     assert list((tmp_path / "tensorboard").glob("events*"))
+    assert result["validation"]["robot"] == "ddagr"
+    assert run_module.describe(result["validation"]).endswith("(turns of the robot ddagr)")
+
+
+def test_a_turn_that_ends_halfway_round_counts_as_worst():
+    _, episode = episodes(1)[0]
+    angle = np.linspace(0.0, np.radians(100.0), 600)
+    turn = episode.turn
+    places = turn.place_on_turn(angle)
+    track = np.column_stack([places, turn.sign * angle])
+    assert _judge(track, episode) == (np.inf, np.inf, False)
 
 
 def test_checkpoints_of_other_settings_and_damaged_ones_are_refused(tmp_path):

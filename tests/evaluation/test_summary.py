@@ -127,3 +127,13 @@ def test_two_controllers_that_are_one_seed_of_one_arm_are_refused():
     other = [row | {"controller": "elsewhere/seed_1/policy.npz"} for row in twins]
     with pytest.raises(InputError, match=r"'ppo_1' and 'elsewhere/seed_1/policy.npz' are both training seed 1"):
         summaries([*twins, *other])
+
+
+def test_the_radius_of_a_part_of_a_turn_counts_as_worst():
+    rows = rows_of("B1", [0.01, 0.02, 0.03, 0.04])
+    rows[1]["status"] = "SHORT_ARC"
+    assert [size_of(row) for row in rows] == [0.01, math.inf, 0.03, 0.04]
+    summary = summaries(rows)["B1"]["V"]
+    assert summary["undefined_radius"] == 1
+    assert summary["radius_error_p95"]["value"] is None
+    assert summary["radius_error_signed_median"]["value"] == pytest.approx(0.03)
