@@ -15,14 +15,16 @@ import tempfile
 import threading
 import time
 from concurrent.futures import Future
+from concurrent.futures.process import BrokenProcessPool
 from functools import partial
-from multiprocessing import get_context
+from multiprocessing import current_process, get_context
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any
 
 from pebble import ProcessExpired, ProcessPool
 
+from ddagr_gym.errors import InputError
 from ddagr_gym.tasks.attempt import attempt, linear_algebra
 from ddagr_gym.tasks.shared import SharedFile, SharedPath, pickled
 from ddagr_gym.tasks.task import Failure, Limits, Outcome, Task
@@ -44,6 +46,9 @@ class LocalProcesses:
     """
 
     def __init__(self, workers: int, limits: Limits, fresh: bool = False) -> None:
+        if _starting():
+            # a worker that runs its parent's script anew: silent, for the parent says what to do
+            raise SystemExit(1)
         self.slots = workers
         self._limits = limits
         self._done: SimpleQueue[tuple[int, Future[Any]]] = SimpleQueue()
@@ -79,6 +84,11 @@ class LocalProcesses:
             return outcome
         if isinstance(error, ProcessExpired):
             return Outcome(failure=Failure("lost", f"its worker ended with code {error.exitcode}"))
+        if isinstance(error, BrokenProcessPool):
+            raise InputError(
+                "the worker processes ended while they started: in a script, which each of them runs anew, put the "
+                'work below `if __name__ == "__main__":`, or let one process do it (processes=1).'
+            ) from None
         if isinstance(error, TimeoutError):
             return Outcome(failure=Failure("over its time", f"limit of {self._limits.seconds:g} s"))
         raise error
@@ -111,6 +121,11 @@ class LocalProcesses:
     def _remove_folder(self) -> None:
         if self._folder is not None:
             shutil.rmtree(self._folder, ignore_errors=True)
+
+
+def _starting() -> bool:
+    """Whether this is a worker that still loads its parent's script."""
+    return bool(getattr(current_process(), "_inheriting", False))
 
 
 def _attempt(call: bytes, memory: int | None) -> bytes:

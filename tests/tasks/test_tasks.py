@@ -288,6 +288,19 @@ if __name__ == "__main__":
 """
 
 
+def test_a_script_without_a_guard_ends_in_one_sentence(tmp_path):
+    script = tmp_path / "script.py"
+    script.write_text(
+        "from ddagr_gym.tasks import Task, TaskRunner, run_tasks\n"
+        "with TaskRunner(2) as runner:\n"
+        "    run_tasks([Task(str(n), abs, (n,)) for n in range(3)], 'numbers', runner)\n"
+    )
+    ended = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, check=False)
+    assert ended.returncode != 0
+    assert ended.stderr.count("Traceback") == 1  # of the script itself, none of its workers
+    assert 'put the work below `if __name__ == "__main__":`' in ended.stderr.splitlines()[-1]
+
+
 def alive(pid: int) -> bool:
     """Whether a process runs; one that has ended and that nobody has waited for does not."""
     try:
