@@ -13,7 +13,8 @@ class DriveProposal:
         manoeuvre: name, "" where nothing helps.
         why: in words: what would show, and how often it has to be driven; or why nothing helps.
         separates: pairs of names that it tells apart within half an hour.
-        power: least expected gain of a pair per minute of it; ln 19 = 2.9 tells a pair apart.
+        power: least expected gain of a pair per minute of it; ln 19 = 2.9 tells a pair apart, where it is at least
+            0.24 of all that the right name gains.
         minutes: of it until the worst pair is told apart; null where that takes more than half an hour.
     """
 

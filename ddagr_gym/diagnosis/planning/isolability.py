@@ -7,8 +7,9 @@ nominal parameters projected out follow, to first order in the sizes,
   sensitivity;
 - isolability of one effect against another: the share of its sensitivity that the other cannot imitate at any likely
   size of its own (prior of :mod:`ddagr_gym.identification.size_prior`), in the worst of its detectable sizes;
-- the size from which the two are told apart: where the expected gains differ by ln 19, so that the wrong name keeps a
-  weight of 5 percent.
+- the size from which the two are told apart: where the expected gains differ so far that the wrong name keeps a weight
+  of 5 percent (:func:`ddagr_gym.diagnosis.result.equivalence.runs_apart`). Where that is less than the library's form
+  of the right name may lose, no size is told apart.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from ddagr_gym.control.manoeuvres import Manoeuvre
 from ddagr_gym.diagnosis.gates.thresholds import LEVEL, Gate, Thresholds
 from ddagr_gym.diagnosis.planning.planned_drive import plan, with_room
 from ddagr_gym.diagnosis.result.detectable import Detectable, detectable, least_multiple
+from ddagr_gym.diagnosis.result.equivalence import runs_apart
 from ddagr_gym.diagnosis.result.files import finite_or_null
 from ddagr_gym.diagnosis.search.candidates import Candidate
 from ddagr_gym.diagnosis.search.inner_products import Terms
@@ -38,9 +40,6 @@ from ddagr_gym.physics.effects import Effect
 Array = NDArray[np.float64]
 
 SCHEMA = "ddagr-isolability/1"
-
-APART = math.log(19.0)
-"""Difference of gains at which the wrong one of two names keeps a weight of 5 percent."""
 
 ALIKE = 0.2
 """Isolability below which a pair counts as confused (ours: telling apart takes twice the detectable size and more)."""
@@ -262,7 +261,8 @@ def _pair(directions: Sequence[_Direction], rival: str, terms: Terms, matrix: Ar
             return math.nan, math.inf
         imitated = max(_imitated(direction, c, matrix) for c in rivals)
         share = min(max(1.0 - imitated / own, 0.0), 1.0)
-        needed = math.sqrt(2.0 * APART / (share * own)) / direction.least if share > 1e-9 else math.inf
+        # gains grow with the square of the size as they do with the number of drives
+        needed = math.sqrt(runs_apart(0.5 * share * own, 0.5 * own)) / direction.least
         multiples = max(needed, _shown(direction, directions))
         if share < worst[0] or (share == worst[0] and multiples > worst[1]):
             worst = (share, multiples)

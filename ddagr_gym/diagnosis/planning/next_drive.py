@@ -3,31 +3,28 @@
 Each rival is taken for the truth at its fitted size. What it would do to the readings of a manoeuvre is then explained
 as well as possible by another rival, whose size, with the windows' unknowns and the nominal parameters, is refitted
 linearly. Half the square of what is left over the noise is the gain by which the right name would lead; it is compared
-per minute of driving.
+per minute of driving. A lead that is less than the library's form of the right name may lose settles nothing, however
+often it is driven.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ddagr_gym.control.manoeuvres import MANOEUVRES, Manoeuvre
 from ddagr_gym.diagnosis.answer.channel_faults import CHANNEL_FAULT_TITLES
 from ddagr_gym.diagnosis.answer.next_drive_plan import DriveProposal, NextDrivePlan
 from ddagr_gym.diagnosis.answer.verdict import Diagnosis, Finding, Options
-from ddagr_gym.diagnosis.planning.isolability import APART
-from ddagr_gym.diagnosis.planning.planned_drive import RATE, SENSORS, Plan, plan, with_room
+from ddagr_gym.diagnosis.planning.planned_drive import RATE, SENSORS, plan, with_room
+from ddagr_gym.diagnosis.planning.separations import Separation, columns_of, separations
 from ddagr_gym.diagnosis.preprocessing.session import DiagnosisSession
-from ddagr_gym.diagnosis.search.candidates import Candidate, candidates_of
 from ddagr_gym.diagnosis.search.initial_guess import looped
-from ddagr_gym.diagnosis.search.scan import drive_extent, probe_columns
 from ddagr_gym.diagnosis.setting import Setting
 from ddagr_gym.errors import InputError
-from ddagr_gym.identification.least_squares import explained_by
 from ddagr_gym.identification.nuisances import NuisancePriors
 from ddagr_gym.identification.size_prior import TYPICAL_MULTIPLE
 from ddagr_gym.identification.windows import CHANNELS
@@ -37,8 +34,6 @@ from ddagr_gym.physics.effects.encoder_scale import EncoderScale
 from ddagr_gym.physics.effects.registry import effect_kind
 from ddagr_gym.physics.effects.wheel_radius_mismatch import WheelRadiusMismatch
 from ddagr_gym.simulator import simulate
-
-Array = NDArray[np.float64]
 
 SEEN_IN_VALUES = ("sensor_hold", *CHANNEL_FAULT_TITLES)
 """Names that no drive needs to tell from others."""
@@ -51,39 +46,6 @@ MOST_MINUTES = 30.0
 
 _ALTERNATIVES = 3
 """Manoeuvres that are listed beside the best, at most (ours: a short list to choose from)."""
-
-_NOTHING = 1e-12
-"""Gain per minute, and information, below which there is nothing but rounding."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Columns:
-    """Projected sensitivities of a plan's windows.
-
-    Attributes:
-        table: (W, M + S, P + K) nuisances, then effects at their sizes and their probes.
-        precision: (P,).
-        whole: column of each rival at its size.
-        probes: columns of each rival's candidates, with the precision of their multiples.
-    """
-
-    table: Array
-    precision: Array
-    whole: tuple[int, ...]
-    probes: tuple[tuple[tuple[tuple[int, ...], Array], ...], ...]
-
-
-@dataclass(frozen=True)
-class _Separation:
-    """Of a pair in a manoeuvre.
-
-    Attributes:
-        gain: of the right name over the wrong one.
-        channels: (8,) shares of the channels in it.
-    """
-
-    gain: float
-    channels: tuple[float, ...]
 
 
 def next_drive(
@@ -121,8 +83,8 @@ def next_drive(
     own = with_room(Setting() if setting is None else setting, manoeuvres)
     prepared = plan(robot, soil, manoeuvres, sensors, starts=starts, seed=seed, setting=own)
     progress("simulating the rivals")
-    columns = _columns(prepared, planned)
-    found = [_separations(prepared, columns, number, len(planned)) for number in range(len(manoeuvres))]
+    columns = columns_of(prepared, planned)
+    found = [separations(prepared, columns, number, len(planned)) for number in range(len(manoeuvres))]
     return _answer(manoeuvres, planned, found)
 
 
@@ -179,111 +141,46 @@ def _towards(place: tuple[float, float], robot: Robot, soil: Soil, manoeuvre: Ma
     return place[0] - float(columns["true_x"][middle]), place[1] - float(columns["true_y"][middle]), 0.0
 
 
-def _columns(prepared: Plan, rivals: Sequence[Effect]) -> _Columns:
-    """Simulate every rival at its size and by its probes, and project the windows' unknowns out."""
-    problem, fitted = prepared.problem, prepared.fitted
-    extent = drive_extent(problem, fitted.prediction)
-    free = np.flatnonzero(problem.free)
-    columns = list(np.moveaxis(fitted.by_parameter[..., free], 2, 0))
-    whole, probes = [], []
-    for rival in rivals:
-        whole.append(len(columns))
-        columns += probe_columns(problem, fitted, [rival])
-        own = []
-        for candidate in _close(candidates_of(type(rival), extent, 0), rival):
-            places = tuple(range(len(columns), len(columns) + len(candidate.probes)))
-            columns += probe_columns(problem, fitted, candidate.probes)
-            own.append((places, 1.0 / np.array(candidate.scales) ** 2))
-        probes.append(tuple(own))
-    table = fitted.elimination.project(problem.padded(np.stack(columns, axis=2)))
-    return _Columns(table, 1.0 / problem.prior[free] ** 2, tuple(whole), tuple(probes))
-
-
-def _close(candidates: Sequence[Candidate], rival: Effect) -> list[Candidate]:
-    """Candidates that may imitate another effect: none of a flip or limit, which stands where it was fitted."""
-    if rival.categorical or not rival.differentiable:
-        return []
-    if {"centre_x", "centre_y"} <= set(rival.shape_names()):
-        return []
-    return list(candidates)
-
-
-def _separations(prepared: Plan, columns: _Columns, number: int, count: int) -> dict[tuple[int, int], _Separation]:
-    """By pair (truth, rival) in one manoeuvre; the truth against nothing where it is alone."""
-    chosen = prepared.problem.blocked.windows.recording == number
-    table = columns.table[chosen]
-    flat = table.reshape(-1, table.shape[2])
-    total = flat.T @ flat
-    pairs = [(a, b) for a in range(count) for b in range(count) if a != b] or [(0, -1)]
-    return {pair: _separation(pair, columns, total, table) for pair in pairs}
-
-
-def _separation(pair: tuple[int, int], columns: _Columns, total: Array, table: Array) -> _Separation:
-    """What the best imitation by the rival leaves of the truth."""
-    truth = columns.whole[pair[0]]
-    groups: list[tuple[tuple[int, ...], Array]] = [((), np.zeros(0))]
-    if pair[1] >= 0:
-        whole = columns.whole[pair[1]]
-        own = columns.probes[pair[1]] or (((), np.zeros(0)),)
-        groups = [((whole, *places), np.concatenate([[0.0], precision])) for places, precision in own]
-    left = [_left_over(truth, places, precision, columns, total, table) for places, precision in groups]
-    return min(left, key=lambda item: item.gain)
-
-
-def _left_over(
-    truth: int, places: Sequence[int], precision: Array, columns: _Columns, total: Array, table: Array
-) -> _Separation:
-    p = len(columns.precision)
-    index = np.array([*range(p), *places, truth])
-    inside = total[np.ix_(index, index)]
-    weights = np.concatenate([columns.precision, precision])
-    ridge = weights + 1e-9 * np.maximum(np.diag(inside)[:-1], _NOTHING)
-    answer = explained_by(inside[:-1, :-1], ridge, inside[:-1, -1])
-    gain = 0.5 * max(float(inside[-1, -1] - inside[-1, :-1] @ answer), 0.0)
-    rest = table[..., truth] - table[..., index[:-1]] @ answer
-    rows = rest.shape[1] // len(CHANNELS) * len(CHANNELS)
-    # the rows of the priors lie below the block means
-    energy = (rest[:, :rows].reshape(rest.shape[0], -1, len(CHANNELS)) ** 2).sum(axis=(0, 1))
-    whole = float(energy.sum())
-    return _Separation(gain, tuple((energy / whole).tolist() if whole > 0.0 else energy.tolist()))
-
-
 def _answer(
-    manoeuvres: Sequence[Manoeuvre], rivals: Sequence[Effect], found: Sequence[Mapping[tuple[int, int], _Separation]]
+    manoeuvres: Sequence[Manoeuvre], rivals: Sequence[Effect], found: Sequence[Mapping[tuple[int, int], Separation]]
 ) -> NextDrivePlan:
     minutes = [m.duration / 60.0 for m in manoeuvres]
     power = [min(s.gain for s in f.values()) / t for f, t in zip(found, minutes, strict=True)]
-    order = sorted(range(len(manoeuvres)), key=lambda k: -power[k])
+    # more of what leaves a pair together for ever is no better
+    open_ = [any(math.isinf(s.runs) for s in f.values()) for f in found]
+    order = sorted(range(len(manoeuvres)), key=lambda k: (open_[k], -power[k]))
     proposals = [_proposal(manoeuvres[k], rivals, found[k], power[k], minutes[k]) for k in order]
     best = proposals[0]
     if best.minutes is None:
-        return NextDrivePlan.none(_nothing(rivals), best.power)
+        return NextDrivePlan.none(_nothing(rivals, found), best.power)
     others = tuple(item for item in proposals[1:] if item.minutes is not None)[:_ALTERNATIVES]
     return NextDrivePlan(**vars(best), alternatives=others)
 
 
 def _proposal(
-    manoeuvre: Manoeuvre, rivals: Sequence[Effect], found: Mapping[tuple[int, int], _Separation], power: float, t: float
+    manoeuvre: Manoeuvre, rivals: Sequence[Effect], found: Mapping[tuple[int, int], Separation], power: float, t: float
 ) -> DriveProposal:
-    needed = APART / power if power > _NOTHING else math.inf
+    needed = t * max(item.runs for item in found.values())
     separates = tuple(
         (rivals[a].name, rivals[b].name)
         for a, b in found
-        if 0 <= a < b and min(found[a, b].gain, found[b, a].gain) / t >= APART / MOST_MINUTES
+        if 0 <= a < b and t * max(found[a, b].runs, found[b, a].runs) <= MOST_MINUTES
     )
     why = _why(manoeuvre, rivals, found, needed)
     return DriveProposal(manoeuvre.name, why, separates, power, needed if needed <= MOST_MINUTES else None)
 
 
 def _why(
-    manoeuvre: Manoeuvre, rivals: Sequence[Effect], found: Mapping[tuple[int, int], _Separation], needed: float
+    manoeuvre: Manoeuvre, rivals: Sequence[Effect], found: Mapping[tuple[int, int], Separation], needed: float
 ) -> str:
     """The worst pair, where it shows, and how long it takes."""
-    (a, b), worst = min(found.items(), key=lambda item: item[1].gain)
+    (a, b), worst = max(found.items(), key=lambda item: (item[1].runs, -item[1].gain))
     channel = CHANNELS[int(np.argmax(worst.channels))]
     share = 100.0 * max(worst.channels)
     if b < 0:
         what = f"{rivals[a].name} stands out from what soil and robot may do"
+    elif math.isinf(worst.runs):
+        what = f"what {rivals[a].name} leaves that {rivals[b].name} cannot imitate is within the error of its form"
     else:
         what = f"{rivals[a].name} leaves readings that {rivals[b].name} cannot imitate"
     return f"{manoeuvre.description}: {what}, {share:.0f} % of it in {channel}; {_runs(manoeuvre, needed)}."
@@ -298,9 +195,20 @@ def _runs(manoeuvre: Manoeuvre, needed: float) -> str:
     return f"one run of {length} is enough" if runs <= 1 else f"{runs} runs of {length} are needed"
 
 
-def _nothing(rivals: Sequence[Effect]) -> str:
+def _nothing(rivals: Sequence[Effect], found: Sequence[Mapping[tuple[int, int], Separation]]) -> str:
+    """That no manoeuvre is enough, and of which pairs no number of runs would be."""
     names = ", ".join(rival.name for rival in rivals)
-    return f"No manoeuvre of the bank tells {names} apart within {MOST_MINUTES:g} min with these sensors."
+    said = f"No manoeuvre of the bank tells {names} apart within {MOST_MINUTES:g} min with these sensors."
+    pairs = {(min(pair), max(pair)) for pair in found[0] if min(pair) >= 0}
+    alike = [
+        f"{rivals[a].name} and {rivals[b].name}"
+        for a, b in sorted(pairs)
+        if all(math.isinf(max(item[a, b].runs, item[b, a].runs)) for item in found)
+    ]
+    if not alike:
+        return said
+    less = "they differ by less than the library's forms err"
+    return f"{said} No number of runs is enough for {', '.join(alike)}: {less}."
 
 
 def rivals_of_diagnosis(diagnosis: Diagnosis) -> list[Effect]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -17,8 +18,40 @@ LEAST_WEIGHT = 0.05
 """Weight that a rival needs to stand in the equivalence set (ours, with the level)."""
 
 
+_NOTHING = 1e-12
+"""Gain below which there is nothing but rounding."""
+
 FORM = 0.08
 """Share of its gain that an effect may lose because the library's form of it is not the robot's (ours)."""
+
+
+APART = math.log(19.0)
+"""Lead in cost, in units of :func:`unit_of_cost`, at which the wrong one of two names keeps a weight of 5 percent."""
+
+
+def unit_of_cost(gain: float, form: float = FORM) -> float:
+    """What a difference of cost over the dispersion counts in (theory: diagnosis, eq. (9)).
+
+    Args:
+        gain: of the best explanation.
+        form: share of it that its form may lose.
+    """
+    return max(form * gain, 1.0)
+
+
+def runs_apart(lead: float, gain: float) -> float:
+    """Repetitions of a drive after which the wrong one of two names keeps a weight of 5 percent (with sizes as usual).
+
+    Lead and gain grow alike with them: infinite where the lead is less than the library's form of the right name may
+    lose.
+
+    Args:
+        lead: gain of the right name over the wrong one in one drive.
+        gain: all that the right name gains in it.
+    """
+    if lead <= _NOTHING or lead < APART * FORM * gain:
+        return math.inf
+    return APART / lead
 
 
 def equivalence_weights(
@@ -53,8 +86,7 @@ def equivalence_weights(
     unusual = chosen + [implausibility(rival.fitted.point.effects[-1]) for rival in rivals]
     count = windows.shape[1]
     counts = rng.multinomial(count, np.full(count, 1.0 / count), size=DRAWS).astype(float)
-    unit = max(form * rivals[0].gain, 1.0)
-    costs = (counts @ windows.T + priors) / dispersion / unit + unusual
+    costs = (counts @ windows.T + priors) / dispersion / unit_of_cost(rivals[0].gain, form) + unusual
     relative = np.exp(costs.min(axis=1, keepdims=True) - costs)
     weights = (relative / relative.sum(axis=1, keepdims=True)).mean(axis=0)
     kept = {

@@ -9,8 +9,9 @@ import pytest
 
 from ddagr_gym.control.manoeuvres import Manoeuvre
 from ddagr_gym.diagnosis.gates.thresholds import Gate, Thresholds
-from ddagr_gym.diagnosis.planning.isolability import APART, SCHEMA, chance_gates, isolability
+from ddagr_gym.diagnosis.planning.isolability import SCHEMA, chance_gates, isolability
 from ddagr_gym.diagnosis.planning.planned_drive import plan
+from ddagr_gym.diagnosis.result.equivalence import APART, FORM
 from ddagr_gym.diagnosis.search.inner_products import InnerProducts
 from ddagr_gym.diagnosis.search.scan import scan
 from ddagr_gym.errors import InputError
@@ -106,6 +107,15 @@ def test_told_apart_never_below_detected(turn) -> None:
         others = [v for j, v in enumerate(turn.apart[i]) if j != i]
         assert min(others) >= turn.of(name).multiples * (1.0 - 1e-9)
     assert math.isclose(APART, math.log(0.95 / 0.05))
+
+
+def test_what_differs_by_less_than_a_form_errs_is_told_apart_at_no_size(straight, turn) -> None:
+    for found in (straight, turn):
+        share, apart = np.array(found.share), np.array(found.apart)
+        within = share < APART * FORM
+        assert within.any()
+        assert np.isinf(apart[within]).all()
+    assert np.isfinite(np.array(turn.apart)[np.array(turn.share) > APART * FORM]).any()
 
 
 def test_nuisances_with_priors_take_their_share() -> None:

@@ -8,14 +8,16 @@ import pytest
 
 from ddagr_gym.control.manoeuvres import Manoeuvre
 from ddagr_gym.diagnosis.answer.verdict import Diagnosis, Estimate, Finding, GatesUsed, Options
-from ddagr_gym.diagnosis.planning.isolability import APART
 from ddagr_gym.diagnosis.planning.next_drive import (
     MOST_MINUTES,
+    _answer,
     next_drive,
     rivals_of_diagnosis,
     sensors_of_diagnosis,
     setting_of_diagnosis,
 )
+from ddagr_gym.diagnosis.planning.separations import Separation
+from ddagr_gym.diagnosis.result.equivalence import APART, FORM, LEAST_WEIGHT, runs_apart, unit_of_cost
 from ddagr_gym.diagnosis.setting import Setting
 from ddagr_gym.errors import InputError
 from ddagr_gym.identification.nuisances import NuisancePriors
@@ -24,7 +26,7 @@ from ddagr_gym.presets import get_robot, get_soil
 
 STRAIGHT = Manoeuvre("one_heading", ((8.0, 0.8, 0.8),), "straight")
 TURN = Manoeuvre("two_headings_short", ((4.0, 0.8, 0.8), (8.0, 0.8, -0.8), (4.0, 0.8, 0.8)), "with a turn")
-SPEEDS = Manoeuvre("speeds_short", ((5.0, 0.3, 0.3), (5.0, 1.2, 1.2)), "two speeds")
+SPEEDS = Manoeuvre("speeds_short", 2 * ((2.0, 0.2, 0.2), (2.0, 1.4, 1.4)), "two speeds in turn")
 
 
 def drive(*rivals: str, bank=(STRAIGHT, TURN), **options):
@@ -69,6 +71,30 @@ def test_a_place_is_driven_over() -> None:
     # 0.082 with steps of 5 ms and nine contact nodes, 0.097 with a new derivative at every step, 0.175 with derivatives
     # that are kept; steps divided at launches read 1.2 out of their own noise
     assert far.power == pytest.approx(0.082, abs=0.12)
+
+
+@pytest.mark.parametrize(("lead", "gain"), [(1.0, 3.0), (10.0, 40.0), (200.0, 800.0)])
+def test_so_many_runs_leave_the_wrong_name_one_weight_in_twenty(lead: float, gain: float) -> None:
+    runs = runs_apart(lead, gain)
+    odds = math.exp(-runs * lead / unit_of_cost(runs * gain))
+    assert odds / (1.0 + odds) <= LEAST_WEIGHT + 1e-12
+    assert runs_apart(0.99 * APART * FORM * gain, gain) == math.inf
+
+
+def test_a_lead_within_the_error_of_a_form_is_told_by_no_number_of_runs() -> None:
+    """A tenth of 800 is much per minute, and within the error each time: the one with less of both comes first."""
+    pair = [parse_effect(text) for text in ("slope=0.02", "accelerometer_bias=0.2")]
+    even = (1.0, *7 * (0.0,))
+    never = dict.fromkeys([(0, 1), (1, 0)], Separation(80.0, even, 800.0))
+    soon = dict.fromkeys([(0, 1), (1, 0)], Separation(2.0, even, 4.0))
+    answer = _answer((STRAIGHT, TURN), pair, [never, soon])
+    assert answer.manoeuvre == TURN.name
+    assert answer.separates == (("slope", "accelerometer_bias"),)
+    assert answer.alternatives == ()
+    nothing = _answer((STRAIGHT,), pair, [never])
+    assert nothing.minutes is None
+    assert nothing.separates == ()
+    assert "No number of runs is enough for slope and accelerometer_bias" in nothing.why
 
 
 def finding(name: str, weights: dict[str, float], **parameters: float) -> Finding:
