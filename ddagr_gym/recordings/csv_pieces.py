@@ -19,7 +19,7 @@ PIECE = 2**20
 
 
 class PieceParser:
-    """Parses a CSV file piece by piece, counting its rows, the header as row 1 and without empty lines.
+    """Parses a CSV file piece by piece, counting its rows below the header from 1 and without empty lines.
 
     pyarrow is given bytes, never the Python stream: its reading thread would hold that beyond an error.
 
@@ -36,7 +36,7 @@ class PieceParser:
 
         self._path = path
         self._names = head.names
-        self._rows = 1
+        self._rows = 0
         self._extra_row = head.delimiter.join("0" * len(head.names)).encode()
         self._parse = arrow_csv.ParseOptions(delimiter=head.delimiter)
         self._decimal = head.decimal_sign(numbers)
@@ -65,7 +65,7 @@ class PieceParser:
             yield from self._parsed(rest[:end])
             rest = rest[end:]
             if len(rest) == PIECE:
-                raise self._unsound(f"the line after row {self._rows} has {PIECE:,} bytes or more")
+                raise self._unsound(f"the line after {self._row(0)} has {PIECE:,} bytes or more")
         yield from self._parsed(rest)
 
     def _parsed(self, piece: bytes) -> Iterator[pa.RecordBatch]:
@@ -78,9 +78,9 @@ class PieceParser:
         try:
             table = self._table(piece)
             if self._is_open(piece, table.num_rows):
-                raise self._unsound(f"the quoted field in row {self._rows + table.num_rows} does not end with its line")
+                raise self._unsound(f"the quoted field in {self._row(table.num_rows)} does not end with its line")
         except pa.ArrowException as error:
-            reason = re.sub(r"Row #(\d+)", self._row_of_the_file, str(error))
+            reason = re.sub(r"Row #(\d+)", lambda found: self._row(int(found[1])), str(error))
             raise (self._no_number(reason) if "conversion error" in reason else self._unsound(reason)) from None
         self._rows += table.num_rows
         yield from table.to_batches()
@@ -100,8 +100,10 @@ class PieceParser:
         options = arrow_csv.ReadOptions(column_names=self._names, block_size=len(piece), use_threads=False)
         return arrow_csv.read_csv(pa.BufferReader(piece), options, self._parse, self._convert)
 
-    def _row_of_the_file(self, found: re.Match[str]) -> str:
-        return f"Row #{self._rows + int(found[1])}"
+    def _row(self, later: int) -> str:
+        """Place of a row that is ``later`` rows below those that were parsed."""
+        row = self._rows + later
+        return f"row {row} below the header" if row else "the header"
 
     def _no_number(self, reason: str) -> InputError:
         sign = {".": "point", ",": "comma"}[self._decimal]

@@ -80,12 +80,12 @@ def time_columns(column_map: ColumnMap) -> tuple[str, ...]:
 
 
 def check_unit_of_dates(path: Path, column_map: ColumnMap, names: Iterable[str]) -> None:
-    """Refuse a unit of time for columns that hold dates, which say their own; InputError."""
+    """Refuse a unit of time for columns that hold dates or durations, which say their own; InputError."""
     for name in names:
         if column_map.time.unit != "s":
             raise InputError(
-                f"column {name!r} of {path.name} holds dates, whose unit is their own, and the column map says unit: "
-                f"{column_map.time.unit}: leave unit out under time in the map."
+                f"column {name!r} of {path.name} holds dates or durations, whose unit is their own, and the column map "
+                f"says unit: {column_map.time.unit}: leave unit out under time in the map."
             )
 
 
@@ -145,8 +145,9 @@ class Collector:
             if name in self._zones:
                 column = as_dates(column, zoned=self._zones[name])
             if pa.types.is_temporal(column.type):
-                # Time stamps count in the unit of their own type; the map's unit is then seconds.
-                column = column.cast(pa.timestamp("ns")).cast(pa.int64())
+                # Time stamps and durations count in the unit of their own type; the map's unit is then seconds.
+                kind = pa.duration("ns") if pa.types.is_duration(column.type) else pa.timestamp("ns")
+                column = column.cast(kind).cast(pa.int64())
                 values = column.cast(pa.float64(), safe=False).to_numpy(zero_copy_only=False) * 1e-9
             else:
                 column = column.cast(pa.float64(), safe=False)

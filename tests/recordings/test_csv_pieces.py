@@ -1,4 +1,4 @@
-"""CSV files that span several pieces: the same rows as in one, row numbers of the file, and an end to every error."""
+"""CSV files that span several pieces: the same rows as in one, numbers of rows, and an end to every error."""
 
 from __future__ import annotations
 
@@ -51,16 +51,16 @@ def test_a_header_without_a_line_end_gives_no_rows(tmp_path):
 @pytest.mark.parametrize(
     ("line", "words"), [("5,6", "Expected 3 columns, got 2"), ("5,fast,x", "invalid value 'fast'")]
 )
-def test_errors_name_the_row_of_the_file(tmp_path, before, line, words):
+def test_errors_name_the_row_below_the_header(tmp_path, before, line, words):
     good = "".join(BODY.splitlines(keepends=True)[:before])
-    with pytest.raises(InputError, match=rf"Row #{before + 2}: .*{words}"):
+    with pytest.raises(InputError, match=rf"row {before + 1} below the header: .*{words}"):
         read(tmp_path, f"{HEADER}{good}{line}\n{BODY}")
 
 
 @pytest.mark.parametrize(("before", "end"), [("", "\n"), (BODY, ""), (BODY, "\n" + BODY)])
 def test_a_line_without_end_is_named_by_the_row_before(tmp_path, before, end):
-    row = before.count("\n") + 1
-    with pytest.raises(InputError, match=rf"is not a sound CSV file \(the line after row {row} has 1,048,576 bytes"):
+    row = f"row {before.count(chr(10))} below the header" if before else "the header"
+    with pytest.raises(InputError, match=rf"is not a sound CSV file \(the line after {row} has 1,048,576 bytes"):
         read(tmp_path, HEADER + before + "x" * PIECE + end)
 
 
@@ -76,13 +76,13 @@ def test_a_quoted_field_may_hold_a_line_end_inside_a_piece(tmp_path):
 
 @pytest.mark.parametrize("end", ['"x\n', '"x', '"x\n' + "0,1,y\n" * 5])
 def test_a_quote_that_is_not_closed_swallows_no_rows(tmp_path, end):
-    with pytest.raises(InputError, match="the quoted field in row 3 does not end with its line"):
+    with pytest.raises(InputError, match="the quoted field in row 2 below the header does not end with its line"):
         read(tmp_path, f"{HEADER}0,1,19 inch\n1,2,{end}")
 
 
 def test_a_quoted_line_end_between_two_pieces_is_refused(tmp_path):
     filler = "0,1," + "x" * (PIECE - len("0,1,\n") - 20) + "\n"
-    with pytest.raises(InputError, match="the quoted field in row 3 does not end with its line"):
+    with pytest.raises(InputError, match="the quoted field in row 2 below the header does not end with its line"):
         read(tmp_path, f'{HEADER}{filler}1,2,"a\n{"b" * 40}"\n2,3,c\n')
 
 

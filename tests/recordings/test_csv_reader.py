@@ -124,7 +124,7 @@ def test_dates_with_a_time_of_day_are_seconds(tmp_path, zone, stamp):
 
 def test_dates_have_a_unit_of_their_own(tmp_path):
     path = write(tmp_path, "t,gz\n2026-05-04T10:00:00,1\n2026-05-04T10:00:01,1\n")
-    with pytest.raises(InputError, match=r"column 't' of run\.csv holds dates, whose unit is their own, .* unit: ms"):
+    with pytest.raises(InputError, match=r"column 't' of run\.csv holds dates or durations, .* unit: ms"):
         read_csv(path, replace(MAP, time=TimeSource("t", "ms")))
 
 
@@ -251,3 +251,12 @@ def test_a_pipe_is_not_opened(tmp_path):
     os.mkfifo(path)
     with pytest.raises(InputError, match="not a regular file"):
         load_recording(path)
+
+
+def test_rows_are_counted_below_the_header_in_every_message(tmp_path):
+    own = tmp_path / "own.yaml"
+    own.write_text("time: {column: t}\nchannels: {yaw_rate: {column: gz}}\n")
+    for third, words in (("2,fast", "row 3 below the header"), (",1", "row 3 has no valid time")):
+        path = write(tmp_path, f"t,gz\n0,1\n1,1\n{third}\n3,1\n")
+        with pytest.raises(InputError, match=words):
+            load_recording(path, str(own))

@@ -47,6 +47,17 @@ def test_time_stamps_have_a_unit_of_their_own(tmp_path):
     assert read_parquet(path, nanoseconds).numbers["t"].size == 2
 
 
+@pytest.mark.parametrize("unit", ["s", "ms", "us", "ns"])
+def test_durations_become_seconds(tmp_path, unit):
+    steps = {"s": 1, "ms": 20, "us": 20_000, "ns": 20_000_000}[unit]
+    durations = pa.array([0, steps, None], pa.duration(unit))
+    path = write(tmp_path, {"t": durations, "gz": [0.0, 0.0, 0.0]})
+    np.testing.assert_allclose(read_parquet(path, MAP).numbers["t"], [0.0, 1.0 if unit == "s" else 0.02, np.nan])
+    milliseconds = ColumnMap(TimeSource("t", "ms"), MAP.channels, name="small")
+    with pytest.raises(InputError, match=r"holds dates or durations, .* leave unit out"):
+        read_parquet(path, milliseconds)
+
+
 def test_labels_may_be_numbers_or_text(tmp_path):
     path = write(tmp_path, {"t": [0.0, 1.0, 0.0], "gz": [0.0, 0.0, 0.0], "run": [4, 4, 5]})
     table = read_parquet(path, ColumnMap(TimeSource("t"), MAP.channels, pieces=Pieces(("run",))))
