@@ -16,7 +16,8 @@ from ddagr_gym.identification.noise import ChannelNoise
 from ddagr_gym.identification.signals import interpolated, on_lines
 from ddagr_gym.identification.timing_repair import POSE_CHANNELS
 from ddagr_gym.identification.windows import CHANNELS, STATE, WindowSet
-from ddagr_gym.recordings.schema import GAP_IN_PERIODS, Recording
+from ddagr_gym.recordings.row_times import GAP_IN_PERIODS, in_bursts
+from ddagr_gym.recordings.schema import Recording
 
 Array = NDArray[np.float64]
 
@@ -190,6 +191,8 @@ def _periods(recording: Recording) -> Array:
     """(n,) periods since the row before: 1, but for gaps inside a span, whose time is known."""
     periods = np.ones(len(recording))
     for span in recording.spans():
-        steps = np.diff(recording.t[span]) / recording.period
-        periods[span][1:] = np.where(steps > GAP_IN_PERIODS, steps, 1.0)
+        steps = np.diff(recording.t[span])
+        if not in_bursts(steps):
+            late = steps / recording.period
+            periods[span][1:] = np.where(late > GAP_IN_PERIODS, late, 1.0)
     return periods

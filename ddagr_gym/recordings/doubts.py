@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Protocol
 
@@ -9,7 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ddagr_gym.recordings.channels import CHANNELS
-from ddagr_gym.recordings.plausible import pauses, slow_rows
+from ddagr_gym.recordings.heading_units import near, times_gyro
+from ddagr_gym.recordings.plausible import SLOWEST_PERIOD, pauses, slow_rows
+
+FASTEST_IN_MILLISECONDS = 0.2
+"""Shortest time between rows that may be milliseconds taken for seconds [s] (ours): rows of 5 kHz."""
 
 
 class Readings(Protocol):
@@ -64,6 +69,7 @@ def doubts(recording: Readings) -> Iterator[str]:
             )
     yield from slow_rows(recording.period)
     yield from pauses(recording.t, recording.spans())
+    yield from _milliseconds(recording)
     yield from _degrees(recording)
     yield from _gravity(recording)
     if not recording.command_valid.any():
@@ -75,13 +81,34 @@ def _unit_hint(unit: str) -> str:
     return f" ({hints[unit]}?)" if unit in hints else ""
 
 
+def _milliseconds(recording: Readings) -> Iterator[str]:
+    """Rows of 1 kHz and faster: milliseconds come as often as seconds of a slow log, and only the turns tell."""
+    if not FASTEST_IN_MILLISECONDS < recording.period <= SLOWEST_PERIOD:
+        return
+    as_they_are, as_milliseconds = (_times_gyro(recording, unit) for unit in (1.0, 1e-3))
+    if near(as_milliseconds, 1.0) and not near(as_they_are, 1.0):
+        yield (
+            f"rows come every {recording.period:.3g} s, and the heading turns as far as the gyro says only if it is in "
+            "milliseconds: say unit: ms under time in the column map."
+        )
+
+
+def _times_gyro(recording: Readings, unit: float) -> float:
+    """Change of the heading over that of the integrated gyro [-], a unit of time being ``unit`` seconds."""
+    return times_gyro(unit * recording.t, recording["pose_yaw"], recording["yaw_rate"], recording.spans())
+
+
 def _degrees(recording: Readings) -> Iterator[str]:
     yaw = recording["pose_yaw"][np.isfinite(recording["pose_yaw"])]
-    if not yaw.size or np.max(np.abs(yaw)) > 360.5 or np.max(np.abs(yaw)) < 7.0:
+    if not yaw.size or np.max(np.abs(yaw)) < 7.0:
         return
     # Continuous radians grow by small steps; wrapped degrees jump by 360.
-    if np.any(np.abs(np.abs(np.diff(yaw)) - 360.0) < 20.0):
+    jumps = np.max(np.abs(yaw)) <= 360.5 and np.any(np.abs(np.abs(np.diff(yaw)) - 360.0) < 20.0)
+    ratio = _times_gyro(recording, 1.0)
+    if jumps:
         yield f"pose_yaw jumps by 360 and reaches {np.max(np.abs(yaw)):.4g}: degrees? Say unit: deg in the map."
+    elif near(ratio, math.degrees(1.0)):
+        yield f"pose_yaw changes {ratio:.3g} times as much as the gyro turns: degrees? Say unit: deg in the map."
 
 
 def _gravity(recording: Readings) -> Iterator[str]:

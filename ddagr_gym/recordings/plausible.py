@@ -16,8 +16,9 @@ LONGEST = 1e6
 file, and what counts blocks of a drive would fill the memory."""
 FASTEST_PERIOD = 1e-6
 """Mean time between rows below which stamps have another unit [s] (ours): no log has a million rows a second."""
-SLOWEST_PERIOD = 5.0
-"""Time between rows beyond which the unit of the stamps is doubted [s] (ours): no robot's log is that slow."""
+SLOWEST_PERIOD = 1.5
+"""Time between rows beyond which the unit of the stamps is doubted [s] (ours): logs of 1 Hz exist, and no check of
+motion can use a slower one. Milliseconds of 500 Hz, read as seconds, are 2 s apart."""
 LONGEST_PAUSE = 600.0
 """Time without rows beyond which a recording may hold two drives [s] (ours)."""
 LARGEST_STAMP = 1e305

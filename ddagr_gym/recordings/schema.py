@@ -31,13 +31,11 @@ from ddagr_gym.parameters import Robot
 from ddagr_gym.recordings.channels import CHANNELS
 from ddagr_gym.recordings.doubts import doubts
 from ddagr_gym.recordings.plausible import check_extent, check_magnitude, check_stamps
+from ddagr_gym.recordings.row_times import GAP_IN_PERIODS, longest_period, row_period
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 Ranges = tuple[tuple[int, int], ...]
-
-GAP_IN_PERIODS = 1.8
-"""Time between rows, in median periods, above which a segment ends (ours: one lost sample makes it 2)."""
 
 
 @dataclass(frozen=True)
@@ -152,9 +150,8 @@ class Recording:
 
     @cached_property
     def period(self) -> float:
-        """Median time between rows inside segments [s]."""
-        steps = np.concatenate([np.diff(self.t[a:b]) for a, b in self.meta.segments] or [np.empty(0)])
-        return float(np.median(steps)) if steps.size else math.nan
+        """Median time between rows inside segments [s], the mean where they come in bursts."""
+        return row_period(np.concatenate([np.diff(self.t[a:b]) for a, b in self.meta.segments] or [np.empty(0)]))
 
     def spans(self) -> Iterator[slice]:
         """Slices with one clock and one pose frame."""
@@ -172,7 +169,7 @@ class Recording:
         """New samples per second of one channel inside the spans (median) [Hz]; 0 where it has none."""
         known = np.isfinite(self[name])
         steps = np.concatenate([np.diff(self.t[s][known[s]]) for s in self.spans()] or [np.empty(0)])
-        return float(1.0 / np.median(steps)) if steps.size else 0.0
+        return float(1.0 / row_period(steps)) if steps.size else 0.0
 
     def columns(self) -> dict[str, FloatArray]:
         """All columns by name, ``t`` first."""
@@ -249,7 +246,7 @@ class Recording:
 
 
 def split_at_gaps(t: FloatArray, spans: Ranges) -> Ranges:
-    """Cut spans wherever more than :data:`GAP_IN_PERIODS` median periods lie between rows.
+    """Cut spans wherever more than :data:`GAP_IN_PERIODS` median periods, or times between bursts, lie between rows.
 
     Args:
         t: time [s], (n,), increasing inside spans.
@@ -258,7 +255,7 @@ def split_at_gaps(t: FloatArray, spans: Ranges) -> Ranges:
     steps = np.concatenate([np.diff(t[a:b]) for a, b in spans] or [np.empty(0)])
     if not steps.size:
         return spans
-    return cut_at_gaps(t, spans, GAP_IN_PERIODS * float(np.median(steps)))
+    return cut_at_gaps(t, spans, GAP_IN_PERIODS * longest_period(steps))
 
 
 def cut_at_gaps(t: FloatArray, spans: Ranges, longest: float) -> Ranges:

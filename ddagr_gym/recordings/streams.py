@@ -21,6 +21,7 @@ from ddagr_gym.recordings.files import Limits, sha256_of
 from ddagr_gym.recordings.frames import mounting_frames, static_frames, transforms
 from ddagr_gym.recordings.message_fields import header_stamp
 from ddagr_gym.recordings.ros_messages import BankSpeeds, Extractor, extractor
+from ddagr_gym.recordings.row_times import longest_period
 from ddagr_gym.recordings.schema import FloatArray, Recording, RobotGeometry
 from ddagr_gym.recordings.topic_map import TRANSFORMS, Topic, TopicMap, TopicSource, choose_topics
 
@@ -241,7 +242,7 @@ class _Assembly:
         if self.map.rate:
             base = regular_base(float(base[0]), float(base[-1]), self.map.rate, self.limits.rows)
             return base, 1.0 / self.map.rate
-        return base, float(np.median(np.diff(base)))
+        return base, longest_period(np.diff(base))
 
     def _notes(self, streams: dict[str, Stream], lost: dict[str, int], period: float) -> Iterable[str]:
         for role, topic in self.chosen.items():

@@ -108,3 +108,13 @@ def test_a_heading_logged_as_zeros_is_left_out() -> None:
     present = np.isfinite(blocked.sigma).any(axis=(0, 1))
     assert [CHANNELS[k] for k in np.flatnonzero(~present)] == ["pose_yaw"]
     assert np.isfinite(blocked.residual(np.zeros(windows.measured.shape))).all()
+
+
+def test_without_a_pose_a_place_is_where_the_wheels_rolled_to_also_over_rows_in_bursts():
+    t = (0.04 * np.arange(500)[:, None] + 2e-4 * np.arange(5)).ravel()
+    columns = {"t": t, "yaw_rate": np.zeros(t.size)}
+    columns |= dict.fromkeys(("command_right", "command_left", "encoder_right", "encoder_left"), np.full(t.size, 2.0))
+    recording = Recording.from_columns(columns)
+    windows = cut_windows([recording], 2.0, wheel_radius=0.3, half_track=0.5)
+    placed = located(windows, [recording], 0.3).initial[:, 0]
+    np.testing.assert_allclose(placed, 0.3 * 2.0 * recording.t[windows.start], atol=0.05)

@@ -102,6 +102,24 @@ def make_drive(warthog: RobotGeometry) -> Callable[..., Recording]:
 
 
 @pytest.fixture(scope="session")
+def rested() -> Callable[[Recording, float], Recording]:
+    """Function that lets the robot of a drive stand for a time behind it [s]; poses go on."""
+
+    def rest(made: Recording, seconds: float) -> Recording:
+        count, rng = round(seconds / made.period), np.random.default_rng(1)
+        columns = {"t": np.arange(len(made) + count) * made.period}
+        for name, values in made.channels.items():
+            still = name.startswith(("command", "encoder", "yaw_rate", "specific_force"))
+            level = 0.0 if still else values[np.isfinite(values)][-1]
+            noise = 0.0 if name.startswith(("command", "encoder")) else 0.003 * rng.standard_normal(count)
+            kept = np.arange(count) % 10 == 0 if name.startswith("pose") else np.ones(count, dtype=bool)
+            columns[name] = np.concatenate([values, np.where(kept, level + noise, np.nan)])
+        return Recording.from_columns(columns, made.meta.geometry, source=made.meta.source)
+
+    return rest
+
+
+@pytest.fixture(scope="session")
 def recordings_dir() -> Path:
     """Folder of the real drives: DDAGR_RECORDINGS, else ``recordings`` of the shared folder; skips when absent."""
     shared = Path(os.environ.get("DDAGR_SHARED") or Path(__file__).resolve().parents[3] / "shared")

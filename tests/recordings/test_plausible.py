@@ -85,11 +85,12 @@ def test_a_reading_that_no_sensor_gives_is_named(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("period", "unit"), [(0.02, ""), (1.0, ""), (20.0, "ms"), (2e4, "us"), (2e7, "ns"), (1e12, "")]
+    ("period", "unit"),
+    [(0.02, ""), (1.0, ""), (1.2, ""), (2.0, "ms"), (5.0, "ms"), (20.0, "ms"), (2e4, "us"), (2e7, "ns"), (1e12, "")],
 )
 def test_the_unit_of_a_period(period, unit):
     assert likely_unit(period) == unit
-    assert bool(list(slow_rows(period))) == (period > 5.0)
+    assert bool(list(slow_rows(period))) == (period > 1.5)
 
 
 def test_two_drives_in_one_file_are_doubted_and_two_spans_are_not(tmp_path):

@@ -17,7 +17,7 @@ from ddagr_gym.parameters import STANDARD_GRAVITY
 from ddagr_gym.recordings.checks.blocks import FEWEST_BLOCKS, resample
 from ddagr_gym.recordings.checks.motion_windows import GYRO, STEP, MotionWindows
 from ddagr_gym.recordings.checks.regression import normal_equations, solve
-from ddagr_gym.recordings.checks.turning import LEAST_TURN
+from ddagr_gym.recordings.checks.turning import LEAST_TURN, enough_turns
 from ddagr_gym.recordings.schema import FloatArray
 
 RESPONSE = 0.9
@@ -28,6 +28,8 @@ GRAVITY_SPREAD = 0.15
 """Of gravity's direction in the sensor [-] (ours): 9 degrees of slope and mounting together."""
 GYRO_SPREAD = 0.2
 """Of the gyro's scale [-] (ours)."""
+STILL_TRAVEL = 0.02
+"""Speed below which a robot counts as at rest in a window [m/s] (ours)."""
 COST_OF_A_FAULT = 15.0
 """Chi-square that another fault has to earn (ours): among 384 mountings 6 in 10^3 do so by chance."""
 CLEAR = 10.0
@@ -113,7 +115,8 @@ def fit_mounting(
         None with fewer than five blocks of motion.
     """
     rate, change = turn
-    turns = np.nanmean(np.nan_to_num(rate) ** 2) >= LEAST_TURN**2
+    moving = (np.abs(speed) > STILL_TRAVEL) | (np.abs(rate) > LEAST_TURN)
+    turns = enough_turns(rate, moving, 0.5 * STEP)
     motion = [acceleration, speed * rate, rate, rate**2, change] if turns else [acceleration]
     design = np.stack([np.ones_like(speed), *motion], axis=1)
     known = np.all(np.isfinite(design), axis=1) & np.all(np.isfinite(windows.force[:, :2]), axis=1)

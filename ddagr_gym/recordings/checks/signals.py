@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ddagr_gym.recordings.checks.row_steps import unbroken
 from ddagr_gym.recordings.checks.silences import heard_rows, heard_spans
+from ddagr_gym.recordings.row_times import in_bursts
 from ddagr_gym.recordings.schema import BoolArray, FloatArray, Recording
 
 STILL_SPEED = 0.02
@@ -80,11 +82,15 @@ def near_known(t: FloatArray, known: BoolArray, at: FloatArray | None = None) ->
 
 
 def slope(recording: Recording, values: FloatArray) -> FloatArray:
-    """Central difference over time inside each heard span [per s]; NaN beside missing values."""
+    """Central difference over time inside each heard span [per s]; NaN beside missing values.
+
+    Rows of a burst were read a period apart, whatever their stamps.
+    """
     out = np.full(len(recording), np.nan)
     for span in heard_spans(recording):
         if span.stop - span.start >= 3:
-            out[span] = np.gradient(values[span], recording.t[span])
+            t = recording.t[span]
+            out[span] = np.gradient(values[span], np.linspace(t[0], t[-1], t.size) if in_bursts(np.diff(t)) else t)
     return out
 
 
@@ -104,16 +110,29 @@ def standstills(recording: Recording, margin: float = 0.5, shortest: float = 1.0
     Returns:
         Slices; none where the recording has no encoders.
     """
-    right, left = filled(recording, "encoder_right"), filled(recording, "encoder_left")
-    moving = ~((np.abs(right) < STILL_SPEED) & (np.abs(left) < STILL_SPEED))
-    # Before the first sample of a span the encoders are unknown; a command shows that the robot may move.
-    unknown = ~(np.isfinite(right) & np.isfinite(left))
-    commanded = np.nan_to_num(np.abs(recording["command_right"]) + np.abs(recording["command_left"])) > 0
-    moving = (moving & ~unknown) | (unknown & commanded) | ~heard_rows(recording)
+    if not recording.has("encoder_right", "encoder_left"):
+        return []
+    moving = ~_still(recording) | ~heard_rows(recording)
     pieces = []
-    for segment in recording.segments():
+    for segment in unbroken(recording):
         pieces.extend(_quiet(recording.t, moving, segment, margin, shortest))
     return pieces
+
+
+def _still(recording: Recording) -> BoolArray:
+    """Rows in which both banks stand (n,): by the encoders, or where these are not known by what is commanded.
+
+    In the second before the first reading of a span, which a slow encoder may take, that reading tells too.
+    """
+    right, left = filled(recording, "encoder_right"), filled(recording, "encoder_left")
+    known = np.isfinite(right) & np.isfinite(left)
+    still = (np.abs(right) < STILL_SPEED) & (np.abs(left) < STILL_SPEED)
+    early = np.zeros(len(recording), dtype=bool)
+    for span in heard_spans(recording):
+        first = span.start + int(np.argmax(known[span]))
+        early[span.start : first] = still[first] & (recording.t[span.start : first] >= recording.t[first] - LONGEST_AGE)
+    commands = np.abs(np.stack(recording.held_commands()))
+    return np.where(known, still, np.all(commands == 0.0, axis=0) | (early & ~np.any(commands > 0.0, axis=0)))
 
 
 def _quiet(t: FloatArray, moving: BoolArray, segment: slice, margin: float, shortest: float) -> list[slice]:

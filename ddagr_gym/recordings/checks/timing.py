@@ -6,8 +6,10 @@ import numpy as np
 
 from ddagr_gym.recordings.channels import CHANNELS, COMMANDS, VOLTAGES
 from ddagr_gym.recordings.checks.findings import CheckFinding, Question, judge, not_testable
+from ddagr_gym.recordings.checks.row_steps import MOST_JITTER, jitter, merged_on, steps_in_spans
 from ddagr_gym.recordings.checks.signals import moving_mask
 from ddagr_gym.recordings.checks.silences import longest_wait
+from ddagr_gym.recordings.row_times import GAP_IN_PERIODS, in_bursts, longest_period, row_period
 from ddagr_gym.recordings.schema import BoolArray, FloatArray, Recording
 
 CHECK = "timing"
@@ -15,7 +17,7 @@ CHECK = "timing"
 LONGEST_HOLE = 2.5
 """Periods between rows beyond which they are a gap (ours)."""
 
-JITTER = Question(CHECK, (0.0, 0.3), "-", "Use the sensor's own stamps instead of the logger's.")
+JITTER = Question(CHECK, (0.0, MOST_JITTER), "-", "Use the sensor's own stamps instead of the logger's.")
 """95 % quantile of |time step - median| over the median [-]."""
 GAP = Question(
     CHECK, (0.0, 0.02), "-", "Look for a logger that lost messages; segments around the gaps are used apart."
@@ -31,7 +33,7 @@ the open recordings, whose poses come irregularly."""
 SLOWEST = {"encoder": 2.0, "specific_force": 10.0, "yaw_rate": 10.0, "pose": 1.0}
 """Rate below which a channel cannot follow a robot's motion [Hz] (ours), by the beginning of its name."""
 LONG_HOLD = 5.0
-"""Wait, in median periods, from which a channel counts as not renewed (ours)."""
+"""Wait, in median periods or times between bursts, from which a channel counts as not renewed (ours)."""
 
 
 def timing(recording: Recording) -> list[CheckFinding]:
@@ -40,30 +42,43 @@ def timing(recording: Recording) -> list[CheckFinding]:
 
 
 def _row_findings(recording: Recording) -> list[CheckFinding]:
-    steps = np.concatenate([np.diff(recording.t[s]) for s in recording.segments()] or [np.empty(0)])
+    steps, across, fastest = _steps(recording)
     if steps.size < 2:
         return [not_testable(CHECK, "t", "There are fewer than three rows in a row.", "Record for longer.")]
-    period = float(np.median(steps))
-    jitter = float(np.quantile(np.abs(steps - period), 0.95)) / period
-    across = np.concatenate([np.diff(recording.t[s]) for s in recording.spans()])
-    lost = float(np.sum(across[across > LONGEST_HOLE * period] - period) / np.sum(across))
+    usual = longest_period(steps)
+    lost = float(np.sum(across[across > LONGEST_HOLE * usual] - usual) / np.sum(across))
     count = recording.meta.duplicates_dropped
     duplicates = count / (count + len(recording))
+    where = f" of {fastest}." if fastest else f"; {len(recording.meta.segments)} segments."
     return [
-        JITTER.answer(
-            "t, jitter",
-            jitter,
-            meaning=f"Rows come at {1 / period:.4g} Hz; 19 of 20 steps lie within {100 * jitter:.2g} % of the period.",
-        ),
-        GAP.answer(
-            "t, gaps",
-            lost,
-            meaning=f"{100 * lost:.2g} % of the time is lost in gaps; {len(recording.meta.segments)} segments.",
-        ),
+        JITTER.answer("t, jitter", jitter(steps), meaning=_rate_sentence(steps, fastest)),
+        GAP.answer("t, gaps", lost, meaning=f"{100 * lost:.2g} % of the time is lost in gaps{where}"),
         DUPLICATE.answer(
             "t, duplicates", duplicates, meaning=f"{count} rows repeated the time of the row before and were left out."
         ),
     ]
+
+
+def _steps(recording: Recording) -> tuple[FloatArray, FloatArray, str]:
+    """Times between rows without gaps and with them [s], and "", or those of the fastest channel of merged tables."""
+    fastest = merged_on(recording)
+    if fastest:
+        across = steps_in_spans(recording, np.isfinite(recording[fastest]))
+        return across[across <= GAP_IN_PERIODS * longest_period(across)], across, fastest
+    inside = np.concatenate([np.diff(recording.t[s]) for s in recording.segments()] or [np.empty(0)])
+    return inside, steps_in_spans(recording), ""
+
+
+def _rate_sentence(steps: FloatArray, fastest: str) -> str:
+    rate, percent = f"{1 / row_period(steps):.4g} Hz", f"{100 * jitter(steps):.2g} %"
+    if in_bursts(steps):
+        apart = steps[steps > GAP_IN_PERIODS * np.median(steps)]
+        several = f"Rows come in bursts of about {steps.size / apart.size:.2g}, {np.median(apart):.3g} s apart, "
+        return several + f"and at {rate} on the whole: a logger's stamps, not the sensor's."
+    if fastest:
+        several = f"Rows are those of several sensors, merged on time, of which {fastest} comes at {rate}"
+        return several + f"; 19 of 20 of its steps lie within {percent} of its period."
+    return f"Rows come at {rate}; 19 of 20 steps lie within {percent} of the period."
 
 
 def _rate_findings(recording: Recording) -> list[CheckFinding]:
@@ -102,18 +117,18 @@ def _hold_findings(recording: Recording, name: str, driving: BoolArray) -> list[
     between = waits(recording, name, driving)
     if between.size < 20:
         return [not_testable("rate", name, "The robot hardly drives.", "Record a drive.")]
-    median, longest = float(np.median(between)), float(between.max())
+    median, longest, rate = longest_period(between), float(between.max()), 1 / row_period(between)
     share = float(np.sum(between[between > LONG_HOLD * median]) / np.sum(between))
     slowest = next((rate for start, rate in SLOWEST.items() if name.startswith(start)), 0.0)
     return [
         judge(
             "rate",
             name,
-            1 / median,
-            (1 / median, 1 / median),
+            rate,
+            (rate, rate),
             (slowest, np.inf),
             "Hz",
-            meaning=f"New samples come at {1 / median:.3g} Hz while driving.",
+            meaning=f"New samples come at {rate:.3g} Hz while driving.",
             remedy="Raise the sensor's rate, or declare the channel under held in the map if the logger repeats it.",
             suspects=("sensor_hold",),
         ),

@@ -25,8 +25,8 @@ from ddagr_gym.recordings.checks.regression import (
     sampled,
     solve,
 )
-from ddagr_gym.recordings.checks.signals import filled, integral, new_rows
-from ddagr_gym.recordings.schema import FloatArray, Recording
+from ddagr_gym.recordings.checks.signals import filled, integral, moving_mask, new_rows
+from ddagr_gym.recordings.schema import BoolArray, FloatArray, Recording
 
 CHECK = "sign_and_scale"
 
@@ -49,7 +49,9 @@ BALANCE = Question(
 """Right over left bank's share in the yaw rate [-]; 1 for equal radii, scales and ground, 1.02 to 1.04 on the open
 recordings."""
 LEAST_TURN = 0.05
-"""Root mean square yaw rate below which turns tell nothing [rad/s]."""
+"""Root mean square yaw rate of a moving robot below which turns tell nothing [rad/s]."""
+LEAST_MOTION = 5.0
+"""Time in motion from which standing does not count against the turns [s] (ours): less is a jerk or a gyro's spikes."""
 
 APART = 1.0
 """Time between two headings by which a rate is told beside their noise [s] (ours)."""
@@ -172,31 +174,49 @@ def turns(recording: Recording) -> bool:
     """Whether a drive turns enough to tell a scale by: as the gyro says, or poses and wheels together, against it."""
     if not recording.has("yaw_rate"):
         return False
-    return _turns(recording["yaw_rate"]) or (_turns(_pose_rate(recording)) and _turns(_wheel_rate(recording)))
+    moving, period = moving_mask(recording), recording.period
+    if enough_turns(recording["yaw_rate"], moving, period):
+        return True
+    rate, moved = _pose_rate(recording, moving)
+    return enough_turns(rate, moved, APART) and enough_turns(_wheel_rate(recording), moving, period)
 
 
-def _turns(rate: FloatArray) -> bool:
-    known = rate[np.isfinite(rate)]
-    return bool(known.size) and float(np.sqrt(np.mean(known**2))) >= LEAST_TURN
+def enough_turns(rate: FloatArray, moving: BoolArray, period: float) -> bool:
+    """Whether a yaw rate holds turns while the robot moves, however long it stands besides.
+
+    Args:
+        rate: (n,), NaN where it is not known [rad/s].
+        moving: (n,) where the robot moves; all of the rate counts where that is shorter than :data:`LEAST_MOTION`.
+        period: between the values [s].
+    """
+    known = np.isfinite(rate)
+    driven = rate[known & moving]
+    if driven.size * period < LEAST_MOTION:
+        driven = rate[known]
+    return bool(driven.size) and float(np.sqrt(np.mean(driven**2))) >= LEAST_TURN
 
 
-def _pose_rate(recording: Recording) -> FloatArray:
-    """Yaw rate by headings :data:`APART` apart [rad/s]; a turn by more than half a round between two poses is lost."""
-    rates = [np.empty(0)]
+def _pose_rate(recording: Recording, moving: BoolArray) -> tuple[FloatArray, BoolArray]:
+    """Yaw rate by headings :data:`APART` apart [rad/s], and whether the robot moves at the later one of each two.
+
+    A turn by more than half a round between two poses is lost.
+    """
+    rates, moved = [np.empty(0)], [np.empty(0, dtype=bool)]
     for span in recording.spans():
         rows = span.start + np.flatnonzero(np.isfinite(recording["pose_yaw"][span]))
         t, heading = recording.t[rows], np.unwrap(recording["pose_yaw"][rows])
         if rows.size >= 2:
             later = np.arange(t[0] + APART, t[-1], APART)
             rates.append(np.diff(np.interp(later, t, heading)) / APART)
-    return np.concatenate(rates)
+            moved.append(moving[np.searchsorted(recording.t, later[1:])])
+    return np.concatenate(rates), np.concatenate(moved)
 
 
 def _wheel_rate(recording: Recording) -> FloatArray:
-    """Yaw rate of wheels that roll without slip [rad/s]; nothing without the robot's geometry."""
+    """Yaw rate of wheels that roll without slip (n,) [rad/s]; unknown without the robot's geometry."""
     geometry = recording.meta.geometry
     if geometry is None:
-        return np.empty(0)
+        return np.full(len(recording), np.nan)
     difference = filled(recording, "encoder_right") - filled(recording, "encoder_left")
     return np.asarray(geometry.wheel_radius * difference / (2.0 * geometry.half_track))
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import ddagr_gym
-from ddagr_gym.recordings.checks.arbitration import arbitration
+from ddagr_gym.recordings.checks.arbitration import arbitrated, arbitration
 from ddagr_gym.recordings.checks.findings import Status
 from ddagr_gym.recordings.load import load_recording
 
@@ -187,6 +187,12 @@ def test_without_a_pose_gravity_tells_an_imu_upside_down_from_exchanged_sides(ma
 def test_a_turned_imu_is_named_where_its_accelerometer_stops(make_drive, share):
     turned = stopped(mounted(make_drive(), (0, 1, 0), (-1, 0, 0), (0, 0, 1)), share, *IMU)
     assert ("imu_mounting", "specific_force and yaw_rate") in suspicious(turned)
+
+
+def test_a_long_rest_hides_nothing_of_how_the_imu_is_mounted(make_drive, rested):
+    found = arbitrated(rested(make_drive(effective_track=12.0), 600.0), np.random.default_rng(0))
+    assert found.mounting.gyro[0] == pytest.approx(1.0, abs=0.05)
+    assert np.isfinite(found.mounting.errors[1, 1])
 
 
 def test_two_sources_that_disagree_decide_nothing(make_drive):

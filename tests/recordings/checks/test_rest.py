@@ -151,3 +151,52 @@ def test_a_wrong_scale_shows_in_the_size_of_gravity():
     drive = stops(ROUND)
     drive.channels["specific_force_z"][:] *= 1.05
     assert gravity(drive)[0].status is Status.SUSPICIOUS
+
+
+def commanded(drive, *, on_change=False):
+    """The drive with commands that are its encoders' speeds."""
+    speed = np.array(drive["encoder_right"])
+    if on_change:
+        speed[1:][np.diff(speed) == 0] = np.nan
+    return Recording.from_columns({**drive.columns(), "command_right": speed, "command_left": speed})
+
+
+def read_where(drive, rows):
+    """The drive with encoders that report in some rows only."""
+    encoders = {name: np.where(rows, drive[name], np.nan) for name in ("encoder_right", "encoder_left")}
+    return Recording.from_columns({**drive.columns(), **encoders})
+
+
+@pytest.mark.parametrize("on_change", [False, True])
+@pytest.mark.parametrize("commands", [False, True])
+def test_without_encoders_there_are_no_rests(commands, on_change):
+    drive = commanded(stops(ROUND), on_change=on_change) if commands else stops(ROUND)
+    drive = read_where(drive, np.zeros(len(drive), dtype=bool))
+    assert standstills(drive) == []
+    assert {f.status for f in noise(drive)} == {Status.NOT_TESTABLE}
+
+
+def test_a_robot_whose_encoders_die_is_not_taken_to_rest_while_commands_are_in_force():
+    drive = commanded(stops(ROUND), on_change=True)
+    dead = read_where(drive, drive.t < 15.0)  # the second rest is from 12 to 20 s
+    kept = standstills(drive)
+    assert len(kept) == 5
+    for piece in standstills(dead):
+        assert any(whole.start <= piece.start and piece.stop <= whole.stop for whole in kept)
+
+
+@pytest.mark.parametrize(("first", "known"), [(0.6, True), (4.0, False)])
+def test_slow_encoders_cost_no_rest_before_their_first_reading(first, known):
+    """A rest of 7.5 s from t = 0, seen from the first reading on or a second before it."""
+    drive = stops(ROUND)
+    pieces = standstills(read_where(drive, drive.t >= first))
+    assert (drive.t[pieces[0].start] == 0.0) == known
+    told = commanded(drive)
+    assert standstills(read_where(told, told.t >= first))[0].start == 0
+
+
+def test_before_the_first_reading_a_command_may_move_the_robot():
+    drive = commanded(stops(ROUND))
+    going = np.where(drive.t < 0.3, 1.0, drive["command_right"])
+    drive = Recording.from_columns({**drive.columns(), "command_right": going})
+    assert standstills(read_where(drive, drive.t >= 0.6))[0].start >= round(0.8 / 0.02)
