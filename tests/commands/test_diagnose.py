@@ -292,7 +292,7 @@ def test_drives_from_before_are_taken_by_the_command(work: Path, tmp_path: Path,
     words = ["diagnose", str(runs / "run_2.parquet"), "--before", str(runs / "run_1.parquet"), "--window", "2"]
     assert main([*words, "--same-ground", "--output", str(tmp_path / "changed")]) == 0
     told = capsys.readouterr().out
-    assert "This drive shows no change against the drive before." in told
+    assert "No change shows against the drive before." in told
     assert "left-out windows are forecast as well as 90 % of those of the drives before" in told
     diagnosis = load(tmp_path / "changed" / "diagnosis.json")
     assert (diagnosis.change.against, diagnosis.change.ground) == ("before", "same")

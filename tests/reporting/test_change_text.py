@@ -37,7 +37,7 @@ def test_the_table_of_all_effects_is_by_distance_over_limit_and_says_what_it_is(
     told = change_text(replace(diagnosis(), change=CHANGE))
     assert told.index("Offset centre of mass") < told.index("Gyro bias")
     assert "A first estimate of each effect as if it were the only one; the answer above fits together" in told
-    assert "only 3 ordinary drives, so that limits are wide" in told
+    assert "Only 3 ordinary drives say what is usual" in told
 
 
 @pytest.mark.parametrize(

@@ -59,6 +59,6 @@ def few_drives_in_words(change: Change) -> str:
     if change.against != CALIBRATION or count >= FEW_DRIVES:
         return ""
     return (
-        f"The calibration has only {count} ordinary drives, so that limits are wide: a comparison with these drives "
-        "themselves (--before in place of --calibration) may show smaller changes."
+        f"Only {count} ordinary drive{'s say' if count > 1 else ' says'} what is usual, so that limits are wide: a "
+        "comparison with the drives themselves (--before in place of --calibration) may show smaller changes."
     )

@@ -20,7 +20,7 @@ def said(change: Change) -> str:
 
 def test_the_effect_nearest_to_its_limit_is_said():
     assert said(CHANGE) == (
-        "This drive shows no change against 3 ordinary drives. The nearest is offset centre of mass (x −0.048 m), at "
+        "No change shows against 3 ordinary drives. The nearest is offset centre of mass (x −0.048 m), at "
         "78 % of its limit: further ordinary drives, or --before with the drives themselves, may tell. Smaller changes "
         "may be there: the table says of each effect which change would have been found 80 times in 100."
     )
@@ -34,6 +34,6 @@ def test_what_is_far_from_its_limit_is_not_said():
 
 
 def test_few_ordinary_drives_are_said_to_see_little():
-    assert few_drives_in_words(CHANGE).startswith("The calibration has only 3 ordinary drives, so that limits are wide")
+    assert few_drives_in_words(CHANGE).startswith("Only 3 ordinary drives say what is usual, so that limits are wide")
     assert few_drives_in_words(replace(CHANGE, ordinary=tuple("abcde"))) == ""
     assert few_drives_in_words(replace(CHANGE, against=BEFORE)) == ""
