@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ddagr_gym.diagnosis.answer.certificate import Certificate, Folds, Gains, Measured, ModelErrors
 from ddagr_gym.diagnosis.certification.forecast import MOTION, UNITS
 from ddagr_gym.diagnosis.result.uncertainty import LEVEL
+from ddagr_gym.diagnosis.wording import in_sentence
 from ddagr_gym.identification.windows import CHANNELS
 
 Array = NDArray[np.float64]
@@ -33,7 +34,11 @@ LEAST_EXPLAINABLE = 0.03
 
 
 def certificate(
-    rule: Folds, found: Mapping[float, Errors], clusters: Mapping[float, NDArray[np.int64]], rng: np.random.Generator
+    rule: Folds,
+    found: Mapping[float, Errors],
+    clusters: Mapping[float, NDArray[np.int64]],
+    rng: np.random.Generator,
+    kept: Sequence[str] = (),
 ) -> Certificate:
     """Errors of all models with their intervals.
 
@@ -42,6 +47,7 @@ def certificate(
         found: errors by horizon, model and quantity.
         clusters: of the predictions, by horizon.
         rng: of the resampling.
+        kept: effects whose sizes are those of the fit to all drives somewhere, because the other drives lack them.
     """
     channels: dict[str, dict[str, ModelErrors]] = {}
     gain: dict[str, dict[str, Gains | None]] = {"": {}, "_readings": {}}
@@ -62,7 +68,7 @@ def certificate(
             share[ending][key] = gain_share(gained)
     return Certificate(
         folds=rule,
-        note=_note(rule, found, lost),
+        note=_note(rule, found, lost, kept),
         horizons=HORIZONS,
         level=LEVEL,
         channels=channels,
@@ -81,12 +87,18 @@ def finished(errors: Errors) -> tuple[Errors, int]:
     return {m: {q: np.where(every[q], v, np.nan) for q, v in e.items()} for m, e in errors.items()}, lost
 
 
-def _note(rule: Folds, found: Mapping[float, Errors], lost: int) -> str:
+def _note(rule: Folds, found: Mapping[float, Errors], lost: int, kept: Sequence[str]) -> str:
     parts = ["Which effects are in the model was decided on all drives; their sizes and the nominal model's were not."]
     if rule == BY_TIME:
         parts.append(
             "There is one recording: its halves judge each other, so that its place, its sensors' biases and its day "
             "are not new to the model that is judged."
+        )
+    if kept:
+        names = " and ".join(in_sentence(name) for name in kept)
+        parts.append(
+            f"A part of the drives is judged by models that were fitted to what lacks {names}: its size is there "
+            "that of the fit to all drives."
         )
     missing = [f"{h:g} s" for h in HORIZONS if h not in found]
     if missing:

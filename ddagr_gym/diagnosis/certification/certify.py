@@ -111,6 +111,8 @@ def _time_fold(problem: Problem, middle: float, late: bool) -> Fold:
 def refitted_on(problem: Problem, fitted: Fitted, fold: Fold) -> Point:
     """Nuisances and sizes from the fold's training windows, by steps from the fit to all of them.
 
+    What none of them shows (:func:`not_shown`) keeps the size of the fit to all.
+
     Args:
         problem: of all windows.
         fitted: to all of them; its sensitivities are kept.
@@ -126,7 +128,14 @@ def refitted_on(problem: Problem, fitted: Fitted, fold: Fold) -> Point:
     reuse = fitted.subset(chosen)
     start = replace(reuse.point, values=values)
     part = problem.subset(chosen).with_held_headings()
-    return fit(part, start, iterations=_REFIT_STEPS, renewals=1, reuse=reuse).point
+    point = fit(part, start, iterations=_REFIT_STEPS, renewals=1, reuse=reuse).point
+    kept, both = not_shown(problem, fitted.point, fold), zip(start.effects, point.effects, strict=True)
+    return replace(point, effects=tuple(before if before.name in kept else after for before, after in both))
+
+
+def not_shown(problem: Problem, point: Point, fold: Fold) -> tuple[str, ...]:
+    """Effects that are present in none of a fold's training windows, as before they begin."""
+    return tuple(item.name for item in point.effects if not problem.present(item.name)[fold.training].any())
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,7 +190,8 @@ def certify_models(session: DiagnosisSession, nominal: Fitted, chosen: Fitted, r
         if kept.any():
             found |= errors
             clusters |= {horizon: _clusters(forecasts.subset(kept), horizon) for horizon in horizons}
-    return certificate(rule, found, clusters, rng)
+    known = dict.fromkeys(name for fold in folds for name in not_shown(problem, chosen.point, fold))
+    return certificate(rule, found, clusters, rng, tuple(known))
 
 
 def _arms(problem: Problem, nominal: Fitted, chosen: Fitted, folds: Sequence[Fold]) -> list[Arm]:
@@ -196,14 +206,28 @@ def _arms(problem: Problem, nominal: Fitted, chosen: Fitted, folds: Sequence[Fol
 
 def _forecast_sets(problem: Problem, recordings: Sequence[Recording]) -> list[tuple[Forecasts, tuple[float, ...]]]:
     """Forecasts that serve several horizons: short ones often, the longest seldom; those that fit into the drives."""
-    short = cut_forecasts(problem, recordings, HORIZONS[1], STRIDE)
+    short = _on_one_side(problem, cut_forecasts(problem, recordings, HORIZONS[1], STRIDE))
     served: list[tuple[Forecasts, tuple[float, ...]]] = []
     if short is None:
-        short = cut_forecasts(problem, recordings, HORIZONS[0], STRIDE)
+        short = _on_one_side(problem, cut_forecasts(problem, recordings, HORIZONS[0], STRIDE))
         return served if short is None else [(short, HORIZONS[:1])]
     served.append((short, HORIZONS[:2]))
-    long = cut_forecasts(problem, recordings, HORIZONS[2], 2.5 * STRIDE, most=60)
+    long = _on_one_side(problem, cut_forecasts(problem, recordings, HORIZONS[2], 2.5 * STRIDE, most=60))
     return served if long is None else [*served, (long, HORIZONS[2:])]
+
+
+def _on_one_side(problem: Problem, forecasts: Forecasts | None) -> Forecasts | None:
+    """Forecasts during which no effect begins or ends, nor in the readings before them; None where there are none.
+
+    A window is simulated with an effect or without it from its first sample to its last.
+    """
+    if forecasts is None or not problem.spells:
+        return forecasts
+    future = forecasts.future
+    begin, end = future.time - PAST, future.time + future.duration
+    crossed = [(future.recording == s.recording) & (begin < s.time) & (s.time < end) for s in problem.spells.values()]
+    kept = ~np.any(crossed, axis=0)
+    return forecasts.subset(kept) if kept.any() else None
 
 
 Learnt = dict[tuple[str, int], ResidualModel]

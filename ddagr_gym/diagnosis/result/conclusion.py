@@ -137,7 +137,7 @@ def _findings(session: DiagnosisSession, found: SearchResult) -> tuple[list[Find
         }
         place = _before(found, effect.name)
         before, after = found.models[place : place + 2]
-        gain = _gain(found, before, effect.name)
+        gain = _gain(found, place, effect.name)
         estimates = {
             name: Estimate(float(getattr(effect, name)), str(effect.parameter(name).metadata["unit"]), spread.get(name))
             for name in (*effect.size_names(), *effect.shape_names())
@@ -178,10 +178,20 @@ def _before(found: SearchResult, name: str) -> int:
     return max(k for k, model in enumerate(found.models) if name not in model.names)
 
 
-def _gain(found: SearchResult, before: ScannedModel, name: str) -> float:
-    """Evidence of an effect: what the scan before it says, or the joint refit that added it where that says more."""
-    linear = next(item.gain for item in before.gains if item.name == name)
-    return max([linear, *(rival.gain for step in found.steps for rival in step if rival.name == name)])
+def _gain(found: SearchResult, place: int, name: str) -> float:
+    """Evidence of an effect: what the scan before it says, or the joint refit that added it where that says more.
+
+    In an earlier step it may have explained what others were named for. One that was swapped in has the refit of the
+    last step before.
+
+    Args:
+        found: by the search.
+        place: of the last model without it.
+        name: of the effect.
+    """
+    linear = next(item.gain for item in found.models[place].gains if item.name == name)
+    refits = [rival.gain for step in found.steps[: place + 1] for rival in step if rival.name == name]
+    return max([linear, *refits[-1:]])
 
 
 def _channel_shares(before: ScannedModel, after: ScannedModel) -> dict[str, float]:
@@ -233,7 +243,7 @@ def _stands(found: SearchResult, thresholds: Thresholds, step: int, name: str) -
         name: of an effect.
     """
     before, after = found.models[step - 1 : step + 1]
-    gain, gate = _gain(found, before, name), further_gates(thresholds, found.models[:step]).of(name).gain
+    gain, gate = _gain(found, step - 1, name), further_gates(thresholds, found.models[:step]).of(name).gain
     if gain < _MANY * gate or before.held_out.get(name, 0.0) < _HOLDS * gain:
         return False
     limits = {channel: _MUCH * limit for channel, limit in thresholds.misfit.items()}

@@ -10,6 +10,7 @@ from ddagr_gym.diagnosis.answer.certificate import Certificate, Gains, Measured
 from ddagr_gym.diagnosis.certification.certificate import (
     BY_RECORDING,
     BY_TIME,
+    certificate,
     finished,
     gain_share,
     gains,
@@ -17,7 +18,13 @@ from ddagr_gym.diagnosis.certification.certificate import (
     resampled,
     worse_on_unseen,
 )
-from ddagr_gym.diagnosis.certification.certify import certify_models, folds_of, refitted_on
+from ddagr_gym.diagnosis.certification.certify import (
+    _on_one_side,
+    certify_models,
+    folds_of,
+    not_shown,
+    refitted_on,
+)
 from ddagr_gym.diagnosis.certification.forecast import (
     MOTION,
     PAST,
@@ -26,7 +33,9 @@ from ddagr_gym.diagnosis.certification.forecast import (
     past_elimination,
     start_states,
 )
+from ddagr_gym.identification.gauss_newton import Fitted, fit
 from ddagr_gym.identification.problem import Problem
+from ddagr_gym.identification.spells import Spell
 from ddagr_gym.identification.windows import CHANNELS, WindowSet
 from tests.diagnosis.conftest import Sloping, session_of
 
@@ -114,6 +123,38 @@ def test_one_recording_is_judged_by_halves(problem_of: Callable[..., Problem], s
         after = time >= (judged.time + judged.duration).max()
         assert (before | after).all()
         assert not (fold.judges(forecasts) & fold.trains(forecasts)).any()
+
+
+@pytest.fixture(scope="module")
+def begun(problem_of: Callable[..., Problem], sloping: Sloping) -> tuple[Problem, Fitted]:
+    """One drive of 24 s in which a slope begins after 13 s, and its fit."""
+    problem = problem_of(sloping.recordings[0]).during({"slope": Spell(0, 13.0)})
+    point = replace(problem.start(), effects=sloping.chosen.point.effects)
+    return problem, fit(problem, point, iterations=2, renewals=1)
+
+
+def test_what_begins_later_than_the_training_keeps_its_size(begun: tuple[Problem, Fitted]) -> None:
+    """Before the onset nothing tells the size, which its prior would draw to nothing."""
+    problem, fitted = begun
+    late, early = folds_of(problem)[1]
+    assert not_shown(problem, fitted.point, late) == ("slope",)
+    assert not_shown(problem, fitted.point, early) == ()
+    assert refitted_on(problem, fitted, late).effects == fitted.point.effects
+    assert refitted_on(problem, fitted, early).effects != fitted.point.effects
+    note = certificate(BY_TIME, {}, {}, np.random.default_rng(0), ("slope",)).note
+    assert "fitted to what lacks sloping ground" in note
+
+
+def test_no_forecast_crosses_an_onset(begun: tuple[Problem, Fitted], sloping: Sloping) -> None:
+    """Nor do the readings that its start comes from."""
+    problem, every = begun[0], cut_forecasts(begun[0], sloping.recordings[:1], 5.0, 1.0)
+    kept = _on_one_side(problem, every)
+    assert every is not None
+    assert kept is not None
+    begin, end = kept.future.time - PAST, kept.future.time + kept.future.duration
+    assert ((end <= 13.0) | (begin >= 13.0)).all()
+    assert 0 < kept.future.count < every.future.count
+    assert _on_one_side(problem.during({}), every) is every
 
 
 def test_halves_are_named_as_the_weaker_proof(problem_of: Callable[..., Problem], sloping: Sloping) -> None:

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from ddagr_gym.diagnosis.gates.thresholds import Gate, Thresholds
-from ddagr_gym.diagnosis.result.conclusion import _verdict, accept
+from ddagr_gym.diagnosis.result.conclusion import _gain, _verdict, accept
 from ddagr_gym.diagnosis.search.scanned_model import SearchResult
 
 GATE = 10.0
@@ -89,6 +89,18 @@ def test_a_name_that_stands_by_itself_is_said_whatever_is_left(
     nominal = model(encoder_left=12.0, yaw_rate=40.0, gain=gain * GATE, held_out=held_out * GATE)
     search = found(nominal, model("gyro_bias", encoder_left=12.0, yaw_rate=yaw_rate))
     assert concluded(search) == (verdict, False)
+
+
+def test_the_gain_of_a_name_is_that_of_the_step_that_added_it() -> None:
+    """The slope explained 90 before the gyro's bias was named, and 30 beside it."""
+    nominal, biased, both = model(gain=20.0), model("gyro_bias", gain=25.0), model("gyro_bias", "slope")
+    step = [SimpleNamespace(name=name, gain=gain) for name, gain in (("gyro_bias", 100.0), ("slope", 90.0))]
+    further = [SimpleNamespace(name="slope", gain=30.0)]
+    search: Any = SearchResult((nominal, biased, both), (tuple(step), tuple(further)))  # type: ignore[arg-type]
+    assert _gain(search, 0, "gyro_bias") == 100.0
+    assert _gain(search, 1, "slope") == 30.0
+    swapped: Any = SearchResult((nominal, biased, both), (tuple(step), ()))  # type: ignore[arg-type]
+    assert _gain(swapped, 1, "slope") == 90.0
 
 
 def test_what_was_added_to_a_name_that_stands_is_refused_alone() -> None:
