@@ -171,7 +171,7 @@ def diagnose(
     Raises:
         InputError: recordings that cannot be diagnosed, unknown names, no thresholds for the robot, options at odds.
         InputWarning: (a warning) the thresholds were made for another robot, soil, uncertainty or window; no robot or
-            soil is given.
+            soil is given; a channel has too few samples to measure its noise and is left out.
 
     Examples:
         >>> import ddagr_gym

@@ -249,21 +249,41 @@ def noise_from_differences(recordings: Sequence[Recording], wheel_radius: float)
         wheel_radius: hub to tread [m].
     """
 
-    def cut(values: Callable[[Recording], NDArray[Any]]) -> list[NDArray[Any]]:
-        return [whole[s] for r in recordings for whole in (values(r),) for s in r.segments()]
-
-    speeds, steady = cut(lambda r: travel_speed(r, wheel_radius)), cut(steady_rows)
+    speeds, steady = _cut(recordings, lambda r: travel_speed(r, wheel_radius)), _cut(recordings, steady_rows)
     found = []
     for name in CHANNELS:
-        pieces = cut(itemgetter(name))
-        shares = [np.isfinite(r[name]).mean() for r in recordings if r.has(name)]
-        sparse = bool(shares) and (max(shares) < SPARSE_SHARE or name.startswith("pose"))
+        pieces, sparse = _cut(recordings, itemgetter(name)), _is_sparse(recordings, name)
         if name == "pose_yaw":
             pieces = [_unwrapped(piece) for piece in pieces]
         if not sparse:
             pieces = _where_steady(pieces, steady)
         found.append(channel_noise_from_differences(pieces, speeds, sparse))
     return tuple(found)
+
+
+def too_few_to_measure(recordings: Sequence[Recording]) -> dict[str, int]:
+    """Samples of each channel that recordings have, but too few of to measure its noise, by name.
+
+    Args:
+        recordings: as of :func:`noise_from_differences`.
+    """
+    found = {}
+    for name in (item for item in CHANNELS if any(r.has(item) for r in recordings)):
+        counts = [int(np.isfinite(piece).sum()) for piece in _cut(recordings, itemgetter(name))]
+        differences = sum(max(count - 3, 0) for count in counts) if _is_sparse(recordings, name) else sum(counts)
+        if differences < _FEWEST:
+            found[name] = sum(counts)
+    return found
+
+
+def _cut(recordings: Sequence[Recording], values: Callable[[Recording], NDArray[Any]]) -> list[NDArray[Any]]:
+    """Pieces of recordings without gaps."""
+    return [whole[s] for r in recordings for whole in (values(r),) for s in r.segments()]
+
+
+def _is_sparse(recordings: Sequence[Recording], name: str) -> bool:
+    shares = [np.isfinite(r[name]).mean() for r in recordings if r.has(name)]
+    return bool(shares) and bool(max(shares) < SPARSE_SHARE or name.startswith("pose"))
 
 
 def _where_steady(pieces: list[Array], steady: list[NDArray[np.bool_]]) -> list[Array]:

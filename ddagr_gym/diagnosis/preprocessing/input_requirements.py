@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import hashlib
+import warnings
 from collections.abc import Sequence
 
 import numpy as np
 
 from ddagr_gym.diagnosis.setting import LEAST_WINDOWS, Setting, commanded_seconds, window_duration, windows_in
-from ddagr_gym.errors import InputError
+from ddagr_gym.errors import InputError, InputWarning
+from ddagr_gym.identification.noise import too_few_to_measure
 from ddagr_gym.identification.windows import PERIOD_TOLERANCE
 from ddagr_gym.parameters import Robot
 from ddagr_gym.presets import robot_option
@@ -99,6 +101,21 @@ def check_different(recordings: Sequence[Recording]) -> None:
         if values in seen:
             raise InputError(f"{seen[values]} and {recording.meta.source} hold the same values: give every drive once.")
         seen[values] = recording.meta.source
+
+
+def warn_of_unmeasured(recordings: Sequence[Recording]) -> None:
+    """Warn of channels that are left out because they have too few samples to measure their noise."""
+    few = too_few_to_measure(recordings)
+    if not few:
+        return
+    names = " and ".join(r.meta.source for r in recordings if any(r.has(name) for name in few))
+    counts = ", ".join(f"{name} ({count} samples)" for name, count in few.items())
+    warnings.warn(
+        f"{names}: {counts} without a gap in the other channels are too few to measure their noise, and left out of "
+        "the fit: record these channels more often, or give longer drives.",
+        InputWarning,
+        stacklevel=3,
+    )
 
 
 def _check_length(recordings: Sequence[Recording], setting: Setting) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 
 from ddagr_gym.diagnosis.gates.source_digest import source_digest
 from ddagr_gym.diagnosis.gates.thresholds import Thresholds
-from ddagr_gym.diagnosis.preprocessing.input_requirements import check_recordings, reading_hash
+from ddagr_gym.diagnosis.preprocessing.input_requirements import check_recordings, reading_hash, warn_of_unmeasured
 from ddagr_gym.diagnosis.preprocessing.known_errors import without_known_errors
 from ddagr_gym.diagnosis.preprocessing.mended_recordings import MendedRecordings, mend_recordings
 from ddagr_gym.diagnosis.setting import Setting, make_problem
@@ -127,11 +127,13 @@ def prepare(
 
     Raises:
         InputError: recordings that cannot be diagnosed.
+        InputWarning: (a warning) a channel has too few samples to measure its noise and is left out.
     """
     check_recordings(recordings, robot, setting)
     mended = mend_recordings(recordings, seed)
     # beside ordinary drives, that readings repeat is no difference
     mended = replace(mended, left_out=()) if thresholds.of_ordinary_drives else mended
+    warn_of_unmeasured(mended.recordings)
     problem = make_problem(robot, soil, mended.recordings, setting)
     gates = thresholds.for_length(problem.covered)
     return DiagnosisSession(robot, soil, mended, setting, problem, thresholds, gates, seed, progress)

@@ -6,10 +6,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ddagr_gym.diagnosis.preprocessing.input_requirements import check_recordings, content_hash
+from ddagr_gym.diagnosis.preprocessing.input_requirements import (
+    check_recordings,
+    content_hash,
+    warn_of_unmeasured,
+)
 from ddagr_gym.diagnosis.result.conclusion import data_source
 from ddagr_gym.diagnosis.setting import Setting, commanded_seconds, window_duration, windows_in
-from ddagr_gym.errors import InputError
+from ddagr_gym.errors import InputError, InputWarning
+from ddagr_gym.identification.noise import noise_from_differences
+from ddagr_gym.identification.windows import CHANNELS
 from ddagr_gym.presets import get_robot
 from ddagr_gym.recordings.schema import Recording
 
@@ -54,6 +60,33 @@ def test_a_sound_drive_passes() -> None:
 def test_what_cannot_be_diagnosed_is_refused(recordings: list[Recording], words: str) -> None:
     with pytest.raises(InputError, match=words):
         check_recordings(recordings, ROBOT, Setting())
+
+
+def with_poses(every: float, seconds: float, segment: float | None = None) -> Recording:
+    """A drive that has one pose in so many seconds, cut into segments [s]."""
+    drive = made(seconds, pose_x=0.0)
+    x = np.where(
+        np.arange(len(drive)) % round(50.0 * every) == 0, np.random.default_rng(1).normal(size=len(drive)), np.nan
+    )
+    rows = round(50.0 * (segment or seconds))
+    cuts = tuple((start, start + rows) for start in range(0, len(drive), rows))
+    return replace(drive, channels={**drive.channels, "pose_x": x}).with_meta(segments=cuts)
+
+
+@pytest.mark.parametrize(("seconds", "segment"), [(37.0, None), (120.0, 3.0)])
+def test_poses_too_few_to_measure_their_noise_are_left_out_aloud(seconds: float, segment: float | None) -> None:
+    """37 poses of a receiver at 1 Hz, or three in each piece of a log that was cut into steps."""
+    few = with_poses(1.0, seconds, segment)
+    assert noise_from_differences([few], ROBOT.outer_radius)[CHANNELS.index("pose_x")] is None
+    with pytest.warns(InputWarning, match=r"drive.csv: pose_x \(.* are too few to measure their noise, and left out"):
+        warn_of_unmeasured([few])
+
+
+def test_enough_poses_are_no_reason_to_warn(recwarn: pytest.WarningsRecorder) -> None:
+    enough = with_poses(0.2, 37.0)
+    assert noise_from_differences([enough], ROBOT.outer_radius)[CHANNELS.index("pose_x")] is not None
+    warn_of_unmeasured([enough])
+    assert not recwarn.list
 
 
 def test_the_hash_knows_every_value(drive: Callable[..., Recording]) -> None:
