@@ -182,7 +182,7 @@ class TurnSettings(Validated):
         middle = self.turn(sum(radii) / 2.0, "left", sum(speeds) / 2.0)
         if middle.duration > EPISODE_DURATION:
             warnings.warn(
-                f"a turn of {middle.radius:g} m at {middle.speed:g} m/s takes {middle.duration:.0f} s and an "
+                f"a turn of {middle.radius:g} m at {middle.speed:g} m/s takes {middle.duration:.1f} s and an "
                 f"episode {EPISODE_DURATION:g} s: give a larger speed, or more max_episode_steps.",
                 InputWarning,
                 stacklevel=2,

@@ -270,7 +270,7 @@ def test_numbers_of_numpy_serve_as_well(radius):
 
 
 def test_a_turn_that_outlasts_the_episode_is_warned_of():
-    with pytest.warns(InputWarning, match=r"a turn of 2\.5 m at 0\.2 m/s takes 44 s and an episode 25 s"):
+    with pytest.warns(InputWarning, match=r"a turn of 2\.5 m at 0\.2 m/s takes 44\.3 s and an episode 25 s"):
         make(radius=2.5)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
