@@ -335,8 +335,8 @@ def _usable(found: Corrected, anyway: bool) -> Corrected:
         )
     if not found.complete:
         warnings.warn(
-            "the diagnosis is not complete: the recordings hold more than was named, and the controller is tuned on "
-            "what was named alone.",
+            "the diagnosis is not complete: the recordings hold more than was named, or a name is doubtful, as its "
+            "sentence says; the controller is tuned on what was named.",
             InputWarning,
             stacklevel=3,
         )

@@ -69,7 +69,8 @@ def doubts(corrected: Corrected) -> list[str]:
         )
     elif not corrected.complete:
         found.append(
-            "The diagnosis is not complete: the recordings hold more than was named, which none of the figures has."
+            "The diagnosis is not complete: the recordings hold more than was named, which none of the figures has, or "
+            "a name is doubtful."
         )
     return found
 
