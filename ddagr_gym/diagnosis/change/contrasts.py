@@ -41,6 +41,7 @@ from ddagr_gym.diagnosis.change.shifts import (
     family_probability,
     probability_of,
     shown,
+    windows_in_effect,
 )
 from ddagr_gym.diagnosis.mid_drive.change_in_time import FEWEST_ASIDE, FEWEST_WINDOWS
 from ddagr_gym.diagnosis.mid_drive.search_in_time import ALIKE
@@ -99,7 +100,7 @@ def contrast_sizes(scores: Scores, keys: Sequence[str], ridge: Array, beside: Se
     apart = np.concatenate([one, -one, np.zeros((len(keys), len(known)))], axis=1)
     answer = np.asarray(np.linalg.solve(inner + prior, apart.T).T)
     informations = scores.informations[:, rows][:, :, rows]
-    degrees = _degrees(answer @ informations @ answer.T)
+    degrees = windows_in_effect(answer @ informations @ answer.T) - 2.0
     if degrees < FEWEST_DEGREES:
         return None
     gradients = (scores.gradient - scores.gradients)[:, rows, None]
@@ -115,12 +116,6 @@ def contrast_sizes(scores: Scores, keys: Sequence[str], ridge: Array, beside: Se
 def _jackknife(away: Array) -> Array:
     """(k, k) covariance of a value, of (W, k) by how much it differs without each window."""
     return (len(away) - 1.0) / len(away) * away.T @ away
-
-
-def _degrees(shares: Array) -> float:
-    """Equation (2), less two: of the (W, k, k) shares of windows in a covariance, by their sizes in it."""
-    sizes = np.einsum("kl,wlk->w", np.linalg.pinv(shares.sum(axis=0), hermitian=True), shares)
-    return float(sizes.sum() ** 2 / (sizes**2).sum()) - 2.0
 
 
 def contrast_of(compared: Compared, scores: Scores, looks: int) -> Shift | None:
@@ -146,7 +141,9 @@ def _shift(compared: Compared, found: Contrast, looks: int) -> Shift:
     covariance = sizes.within + between
     probability = probability_of(candidate.has_sizes, sizes.value, covariance, found.degrees)
     nothing = np.zeros(len(compared.keys))
-    return Shift(compared, sizes.value, nothing, covariance, between, found.degrees, probability, looks, apart=True)
+    return Shift(
+        compared, sizes.value, nothing, covariance, between, found.degrees, probability, found.degrees, looks, True
+    )
 
 
 def in_order(windows: WindowSet) -> Integers:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ddagr_gym.diagnosis.change.contrasts import contrast_sizes
 from ddagr_gym.diagnosis.change.drive_scan import elsewhere, named_in
 from ddagr_gym.diagnosis.change.ordinary import Scores
-from ddagr_gym.diagnosis.change.shifts import Shift, Sizes, probability_of, sizes_of
+from ddagr_gym.diagnosis.change.shifts import Shift, Sizes, degrees_of_freedom, probability_of, sizes_of
 from ddagr_gym.diagnosis.search.candidates import moved_field
 from ddagr_gym.physics.effects import Effect
 
@@ -52,9 +52,13 @@ def refitted_shift(
     size = _multiples(effect, names, away) + further.value / away
     value = size - shift.mean
     farther = _farther(shift, size) if stretched else 1.0
-    covariance = further.within / np.outer(away, away) + farther**2 * shift.between
-    found = replace(shift, value=value, covariance=covariance)
-    return replace(found, probability=probability_of(True, value, covariance, shift.degrees))
+    between = farther**2 * shift.between
+    covariance = further.within / np.outer(away, away) + between
+    degrees = shift.degrees
+    if not shift.apart:
+        degrees = degrees_of_freedom(covariance, between, shift.drives, further.windows)
+    probability = probability_of(True, value, covariance, degrees)
+    return replace(shift, value=value, covariance=covariance, degrees=degrees, probability=probability)
 
 
 def further_sizes(scores: Scores, keys: Sequence[str], apart: bool) -> Sizes | None:

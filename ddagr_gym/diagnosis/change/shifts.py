@@ -11,7 +11,13 @@ further drives (G. K. Smyth, Stat. Appl. Genet. Mol. Biol. 3 (2004) 3),
 
     T = (d0 (B + F) + d_r T_r)/(d0 + d_r),    S = V + T + (T + V_m)/n,                                              (2)
 
-and (t - m)' S^-1 (t - m)/k is compared with F(k, d0 + d_r). F is what simulators of another structure differ by:
+and (t - m)' S^-1 (t - m)/k is compared with F(k, d). Of S only the share between drives, U = S - V, is known as badly
+as d0 + d_r drives tell it; V is known by the windows of the drive, of which some v count (equation (2) of
+:mod:`ddagr_gym.diagnosis.change.contrasts`). With the largest share r of U in the variance of any combination of sizes
+
+    d = max(d0 + d_r, 1/(r^2/(d0 + d_r) + (1 - r)^2/(v - 1)))                                                       (3)
+
+(F. E. Satterthwaite, Biometrics Bull. 2 (1946) 110). F is what simulators of another structure differ by:
 measured for drives from before (:mod:`ddagr_gym.diagnosis.change.measured_scatter`), for calibrations the square of a
 fifth of the least meaningful size, of signs and limits of a fiftieth of the whole.
 
@@ -55,11 +61,13 @@ class Sizes:
         value: (k,).
         within: (k, k) covariance within the drive.
         between: (k, k) expected covariance between drives.
+        windows: how many windows in effect tell the covariance within the drive; 0 where that was not kept.
     """
 
     value: Array
     within: Array
     between: Array
+    windows: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,8 +80,9 @@ class Shift:
         mean: (k,) of ordinary drives.
         covariance: (k, k) of the value, equation (2).
         between: (k, k) share of ordinary drives in it.
-        degrees: of freedom.
+        degrees: of freedom, equation (3).
         probability: of an ordinary drive to show as much, for this candidate alone.
+        drives: degrees of freedom with which the share of ordinary drives is known, d0 + d_r.
         looks: as how many tests it counts: in so many parts of the drive it was looked for.
         apart: whether it is against the rest of the drive in place of ordinary drives.
     """
@@ -85,6 +94,7 @@ class Shift:
     between: Array
     degrees: float
     probability: float
+    drives: float
     looks: int = 1
     apart: bool = False
 
@@ -159,7 +169,31 @@ def sizes_of(scores: Scores, keys: Sequence[str], ridge: Array, beside: Sequence
     expected = scores.between[np.ix_(rows, rows)]
     # what independent readings make of the gradient, without what the priors do: that is between drives
     independent = inverse @ (inner - expected) @ inverse.T
-    return Sizes(inverse @ gradient, at_least(within, independent), inverse @ expected @ inverse.T)
+    windows = 0.0
+    if scores.informations is not None:
+        windows = windows_in_effect(inverse @ scores.informations[:, rows][:, :, rows] @ inverse.T)
+    return Sizes(inverse @ gradient, at_least(within, independent), inverse @ expected @ inverse.T, windows)
+
+
+def windows_in_effect(shares: Array) -> float:
+    """How many windows tell a covariance, of the (W, k, k) shares that each has in it, by their sizes in the whole."""
+    sizes = np.einsum("kl,wlk->w", np.linalg.pinv(shares.sum(axis=0), hermitian=True), shares)
+    return float(sizes.sum() ** 2 / (sizes**2).sum())
+
+
+def degrees_of_freedom(covariance: Array, between: Array, drives: float, windows: float) -> float:
+    """Of a covariance within a drive and between drives, equation (3).
+
+    Args:
+        covariance: (k, k) of sizes.
+        between: (k, k) share of ordinary drives in it.
+        drives: degrees of freedom with which that is known.
+        windows: how many windows in effect tell the rest of it.
+    """
+    if windows <= 1.0:
+        return drives
+    share = min(1.0, float(np.linalg.eigvals(np.linalg.solve(covariance, between)).real.max()))
+    return max(drives, 1.0 / (share**2 / drives + (1.0 - share) ** 2 / (windows - 1.0)))
 
 
 def shown(scores: Scores, keys: Sequence[str]) -> tuple[str, ...]:
@@ -233,7 +267,7 @@ def shift_of(
     pieces = _sizes_in(compared, ordinary.pieces, beside_ordinary) if len(others) == 1 else []
     away = away_from(here, others, pieces, structure, least, ordinary.expected.degrees)
     probability = probability_of(compared.candidate.has_sizes, away.value, away.covariance, away.degrees)
-    return Shift(compared, away.value, away.mean, away.covariance, away.between, away.degrees, probability)
+    return Shift(compared, away.value, away.mean, away.covariance, away.between, away.degrees, probability, away.drives)
 
 
 @dataclass(frozen=True, eq=False)
@@ -245,12 +279,13 @@ class Away:
     covariance: Array
     between: Array
     degrees: float
+    drives: float
 
 
 def away_from(
     here: Sizes, others: Sequence[Sizes], pieces: Sequence[Sizes], structure: Array, least: Array, known: float
 ) -> Away:
-    """Sizes of a drive against those of ordinary ones, equation (2).
+    """Sizes of a drive against those of ordinary ones, equations (2) and (3).
 
     Args:
         here: of the drive.
@@ -266,7 +301,9 @@ def away_from(
     if pieces:
         scatter = _widened(scatter, structure, pieces, least, known)
     between = scatter + (scatter + of_mean) / (degrees + 1.0)
-    return Away(here.value - mean, mean, here.within + between, between, known + degrees)
+    whole, drives = here.within + between, known + degrees
+    freedom = degrees_of_freedom(whole, between, drives, here.windows)
+    return Away(here.value - mean, mean, whole, between, freedom, drives)
 
 
 def _sizes_in(compared: Compared, drives: Sequence[Scores], beside: Sequence[str]) -> list[Sizes]:

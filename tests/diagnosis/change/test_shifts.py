@@ -12,11 +12,13 @@ from ddagr_gym.diagnosis.change.ordinary import Comparison, Scores
 from ddagr_gym.diagnosis.change.refitted_shift import refitted_shift, times_farther
 from ddagr_gym.diagnosis.change.shifts import (
     LEVEL,
+    degrees_of_freedom,
     explained,
     family_probability,
     shift_of,
     single_level,
     sizes_of,
+    windows_in_effect,
 )
 from ddagr_gym.diagnosis.result.detectable import least_multiple
 from ddagr_gym.diagnosis.search.candidates import candidates_of
@@ -139,6 +141,49 @@ def test_a_large_size_does_not_count_as_scatter_of_the_windows_that_show_it():
     wide, narrow = (sizes_of(item, BIAS.keys, BIAS.ridge).within[0, 0] for item in (sums, whole))
     assert narrow == pytest.approx(1.0 / 40.0, rel=0.6)
     assert wide > 10.0 * narrow
+
+
+def driven(rng: np.random.Generator, windows: int, between: float, kept: bool) -> Scores:
+    """A drive in which nothing changed: windows that scatter twice as much as readings say, and differ by a day."""
+    information = np.full((windows, 1, 1), 1.0 / windows)
+    size = rng.normal(0.0, np.hypot(between, 0.2 * LEAST))
+    gradients = information[:, :, 0] * size + 2.0 * rng.normal(size=(windows, 1)) * np.sqrt(information[:, :, 0])
+    prior = np.array([[between**2]])
+    sums = gradients.sum(axis=0), np.eye(1), scattered(gradients), prior
+    return Scores(BIAS.keys, *sums, *((gradients, information) if kept else ()))
+
+
+@pytest.mark.parametrize("between", [0.0, 1.0, 3.0])
+def test_many_windows_give_degrees_of_freedom_and_keep_the_level(between):
+    """By the few ordinary drives alone hardly any would be an alarm at the level of one of many tests."""
+    rng, level, count = np.random.default_rng(3), single_level(5), 1500
+    found = []
+    for _ in range(count):
+        drives = [driven(rng, 40, between, kept=k == 0) for k in range(4)]
+        found.append(shift_of(BIAS, drives[0], against(*drives[1:])))
+    alarms = sum(shift.probability < level for shift in found)
+    fewer = sum(2.0 * stats.t.sf(shift.distance, shift.drives) < level for shift in found)
+    assert fewer <= alarms <= count * level + 3.0 * np.sqrt(count * level)
+    assert all(EXPECTED_DRIVES < shift.drives <= EXPECTED_DRIVES + 2.0 for shift in found)
+    assert all(shift.degrees >= shift.drives for shift in found)
+    if between < 2.0:
+        assert np.median([shift.degrees for shift in found]) > 20.0
+        assert alarms >= 3 * fewer + 3
+
+
+def test_degrees_of_freedom_are_those_of_what_is_known_worst():
+    """Of two sizes, one that only drives scatter and one that only the windows tell."""
+    between = np.diag([1.0, 0.0])
+    assert degrees_of_freedom(np.eye(2), between, 6.0, 40.0) == pytest.approx(6.0)
+    assert degrees_of_freedom(np.eye(1), np.zeros((1, 1)), 6.0, 40.0) == pytest.approx(39.0)
+    assert degrees_of_freedom(np.eye(1), 0.5 * np.eye(1), 6.0, 40.0) == pytest.approx(1.0 / (0.25 / 6.0 + 0.25 / 39.0))
+    assert degrees_of_freedom(np.eye(1), np.zeros((1, 1)), 26.0, 12.0) == 26.0
+    assert degrees_of_freedom(np.eye(1), np.zeros((1, 1)), 6.0, 0.0) == 6.0
+
+
+def test_windows_that_show_nothing_do_not_count():
+    shares = np.concatenate([np.full((10, 1, 1), 2.0), np.zeros((30, 1, 1))])
+    assert windows_in_effect(shares) == pytest.approx(10.0)
 
 
 MEASURED = ExpectedScatter({"gyro_bias": 2.0}, 9.0)
