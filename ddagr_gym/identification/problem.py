@@ -23,6 +23,7 @@ from ddagr_gym.identification.least_squares import Elimination, huber_loss, hube
 from ddagr_gym.identification.motor_currents import CurrentModel
 from ddagr_gym.identification.nuisances import SHIFT_AS_EFFECT, Nuisances
 from ddagr_gym.identification.parameters import disjoint_scopes
+from ddagr_gym.identification.reading_effects import bias_change
 from ddagr_gym.identification.side_by_side import side_by_side
 from ddagr_gym.identification.spells import Spell
 from ddagr_gym.identification.window_model import Reference, WindowModel
@@ -297,7 +298,9 @@ class Problem:
                 continue
             channel = _BIAS_CHANNEL.get(parameter.entries[0]) if len(parameter.entries) == 1 else None
             if channel is not None and not parameter.factor:
-                columns[..., k] = self._bias_column(channel, base, parameter.acts_in(self.blocked.windows.recording))
+                acts = parameter.acts_in(self.blocked.windows.recording)
+                change = bias_change(base.shape, channel, acts, point.effects, self.present)
+                columns[..., k] = self.blocked.derivative(change, base)
             elif not parameter.heading and (self.prior[k] > 0.0 or k in self._varied):
                 simulated.append(k)
         reference = self.reference(point) if reference is None else reference
@@ -359,12 +362,6 @@ class Problem:
             found[..., k] = np.where(chosen[:, None], change, 0.0)
         return found
 
-    def _bias_column(self, channel: int, base: Array, chosen: Chosen | slice = slice(None)) -> Array:
-        """(W, M) sensitivity of a prediction (W, T, 8) to what adds to a channel in the chosen windows."""
-        ones = np.zeros(self.blocked.windows.measured.shape)
-        ones[chosen, :, channel] = 1.0
-        return self.blocked.derivative(ones, base)
-
     def _current_column(self, name: str, point: Point, base: Array) -> Array | None:
         """(W, M) exact sensitivity to a constant of the currents; None for all other parameters."""
         currents = self.model.currents
@@ -389,7 +386,7 @@ class Problem:
         local = [
             by_parameter[..., unknown.parameter]
             if unknown.channel is None
-            else self._bias_column(unknown.channel, base)
+            else self.blocked.derivative(bias_change(base.shape, unknown.channel), base)
             for unknown in self.nuisances.local
         ]
         columns = np.concatenate([by_state, *(column[..., None] for column in local)], axis=2)
