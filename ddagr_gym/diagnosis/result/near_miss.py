@@ -19,8 +19,8 @@ def by_distance(change: Change) -> list[EffectShift]:
 
 
 def nearest(change: Change) -> EffectShift | None:
-    """The effect that stands nearest to its limit; None where none is beyond :data:`NEAR` of it."""
-    return next((item for item in by_distance(change) if over_limit(item) > NEAR), None)
+    """The effect that stands nearest below its limit; None where none is beyond :data:`NEAR` of it."""
+    return next((item for item in by_distance(change) if NEAR < over_limit(item) < 1.0), None)
 
 
 def over_limit(item: EffectShift) -> float:
@@ -29,7 +29,19 @@ def over_limit(item: EffectShift) -> float:
 
 
 def nearest_in_words(change: Change) -> str:
-    """A sentence on the effect that stands nearest to its limit, and on what would tell; "" where none is near."""
+    """Sentences on what stood out in a first step alone, and on the effect nearest to its limit; "" without any."""
+    return _refuted_in_words(change) + _nearest_in_words(change)
+
+
+def _refuted_in_words(change: Change) -> str:
+    """What is there or not and passed its limit by a derivative, where a fit with it found nothing."""
+    names = [in_sentence(item.effect) for item in by_distance(change) if over_limit(item) >= 1.0]
+    if not names:
+        return ""
+    return f" By a first step alone it would be {' or '.join(names)}, but a fit with it explains nothing."
+
+
+def _nearest_in_words(change: Change) -> str:
     found = nearest(change)
     if found is None:
         return ""

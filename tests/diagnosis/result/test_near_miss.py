@@ -33,6 +33,15 @@ def test_what_is_far_from_its_limit_is_not_said():
     assert "nearest" not in said(replace(CHANGE, shifts=()))
 
 
+def test_what_a_fit_refuted_is_not_called_near():
+    sign = EffectShift("accelerometer_sign", 16.0, 5.3, 1e-5, 6.0, {"flip_x": SizeShift(0.9, 0.05, "-", 1.0)})
+    assert said(replace(CHANGE, shifts=(sign, FAR))).startswith(
+        "No change shows against 3 ordinary drives. By a first step alone it would be reversed accelerometer axis, but "
+        "a fit with it explains nothing. Smaller"
+    )
+    assert "The nearest is offset centre of mass" in said(replace(CHANGE, shifts=(sign, NEAR)))
+
+
 def test_few_ordinary_drives_are_said_to_see_little():
     assert few_drives_in_words(CHANGE).startswith("Only 3 ordinary drives say what is usual, so that limits are wide")
     assert few_drives_in_words(replace(CHANGE, ordinary=tuple("abcde"))) == ""
