@@ -36,6 +36,7 @@ from benchmarks.changed_pairs.answers import SOIL, recordings_of
 from benchmarks.changed_pairs.plan import Pair, plan
 from benchmarks.pair_scatter import DEGREES, MOST, least_scatter, log_density, most_likely, rounded
 from ddagr_gym.diagnosis.change.before_drives import GROUND, robot_of_before
+from ddagr_gym.diagnosis.change.between_drives import Away, away_from
 from ddagr_gym.diagnosis.change.channel_rises import channel_rises
 from ddagr_gym.diagnosis.change.drive_fit import moved_parameters
 from ddagr_gym.diagnosis.change.drive_scan import scan_drive
@@ -44,17 +45,14 @@ from ddagr_gym.diagnosis.change.ordinary import Comparison
 from ddagr_gym.diagnosis.change.run import fit_ordinary
 from ddagr_gym.diagnosis.change.shifts import (
     LEVEL,
-    Away,
     Pull,
-    Sizes,
-    away_from,
     distance_at,
     distance_found,
     family_probability,
     probability_of,
     single_level,
-    sizes_of,
 )
+from ddagr_gym.diagnosis.change.sizes import Sizes, sizes_of
 from ddagr_gym.diagnosis.preprocessing.mended_recordings import mend_recordings
 from ddagr_gym.diagnosis.result.detectable import least_multiple
 from ddagr_gym.diagnosis.wording import title
@@ -137,7 +135,7 @@ def _away(item: Mapping[str, Any], scatter: float, known: float) -> Away:
     """Sizes of one candidate in the drive after against those before."""
     here, *others = (_sizes(drive) for drive in item["drives"])
     k = len(here.value)
-    return away_from(here, others, (), scatter**2 * np.eye(k), np.ones(k), known)
+    return away_from(here, others, (), scatter**2 * np.eye(k), np.ones(k), ExpectedScatter(degrees=known))
 
 
 def scatter_of(pairs: Sequence[Mapping[str, Any]], known: float) -> dict[str, float]:

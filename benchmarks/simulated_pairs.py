@@ -39,14 +39,8 @@ from ddagr_gym.diagnosis.change.drive_scan import DriveScan, Priors, scan_drive
 from ddagr_gym.diagnosis.change.ground_slope import deviations_of, effects_of
 from ddagr_gym.diagnosis.change.measured_scatter import PATH
 from ddagr_gym.diagnosis.change.ordinary import Scores, uncertain_parameters
-from ddagr_gym.diagnosis.change.shifts import (
-    LEVEL,
-    distance_at,
-    family_probability,
-    probability_of,
-    single_level,
-    sizes_of,
-)
+from ddagr_gym.diagnosis.change.shifts import LEVEL, distance_at, family_probability, probability_of, single_level
+from ddagr_gym.diagnosis.change.sizes import sizes_of
 from ddagr_gym.diagnosis.null_bank.drives import Template, null_recordings
 from ddagr_gym.diagnosis.null_bank.standard_drives import standard_template
 from ddagr_gym.diagnosis.null_bank.structural_variants import KINDS

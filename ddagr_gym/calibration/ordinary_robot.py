@@ -9,6 +9,7 @@ from ddagr_gym.calibration.files import load, load_robot, load_soil
 from ddagr_gym.calibration.ordinary_drives import robot_deviations, soil_deviations
 from ddagr_gym.calibration.ordinary_files import NAME, load_ordinary
 from ddagr_gym.diagnosis.change.ground_slope import GroundSlope
+from ddagr_gym.diagnosis.change.measured_scatter import measured_scatter
 from ddagr_gym.diagnosis.change.ordinary import OrdinaryRobot
 from ddagr_gym.diagnosis.change.robot_on_ground import uncertain_robot
 
@@ -25,6 +26,7 @@ def load_ordinary_robot(folder: Path) -> OrdinaryRobot:
     calibration = load(folder)
     ordinary = load_ordinary(folder / NAME)
     robot = load_robot(folder)
+    scatter = measured_scatter()
     return OrdinaryRobot(
         robot,
         {ground: load_soil(folder, ground)[1] for ground in calibration.grounds},
@@ -34,6 +36,8 @@ def load_ordinary_robot(folder: Path) -> OrdinaryRobot:
         ordinary.references,
         folder.name,
         hashlib.sha256((folder / NAME).read_bytes()).hexdigest(),
+        known_scatter=scatter.same_ground.of_calibrations,
+        other_scatter=scatter.other_ground.of_calibrations,
         slopes={item.ground: GroundSlope(item.gradient, item.deviations) for item in calibration.slopes},
         on_grounds=ordinary.on_grounds,
     )

@@ -31,18 +31,8 @@ from numpy.typing import NDArray
 from ddagr_gym.diagnosis.change.drive_scan import Compared, DriveScan, elsewhere, named_in
 from ddagr_gym.diagnosis.change.expected_scatter import ExpectedScatter
 from ddagr_gym.diagnosis.change.ordinary import Scores
-from ddagr_gym.diagnosis.change.shifts import (
-    LEVEL,
-    NOTHING,
-    Shift,
-    Sizes,
-    at_least,
-    explained,
-    family_probability,
-    probability_of,
-    shown,
-    windows_in_effect,
-)
+from ddagr_gym.diagnosis.change.shifts import LEVEL, Shift, family_probability, probability_of
+from ddagr_gym.diagnosis.change.sizes import NOTHING, Sizes, at_least, explained, shown, windows_in_effect
 from ddagr_gym.diagnosis.mid_drive.change_in_time import FEWEST_ASIDE, FEWEST_WINDOWS
 from ddagr_gym.diagnosis.mid_drive.search_in_time import ALIKE
 from ddagr_gym.diagnosis.result.detectable import least_multiple

@@ -22,15 +22,22 @@ class ExpectedScatter:
     Attributes:
         deviations: by effect, in least sizes that matter, of limits and signs in the whole of them; those that are
             missing have what intervals are widened by.
-        degrees: of freedom with which that is known.
+        degrees: of freedom with which that is known of a robot before any of its drives.
         moves: by parameter of robot and soil, in prior deviations (r.m.s.); those that are missing move by one.
         rises: by channel, deviation of the logarithm of the mean square that a fit leaves of it.
+        agreeing: the degrees for effects of which the robot's own ordinary drives scatter no more, if these are more.
     """
 
     deviations: Mapping[str, float] = field(default_factory=dict)
     degrees: float = EXPECTED_DRIVES
     moves: Mapping[str, float] = field(default_factory=dict)
     rises: Mapping[str, float] = field(default_factory=dict)
+    agreeing: float = 0.0
+
+    @property
+    def of_calibrations(self) -> ExpectedScatter:
+        """What is expected of a robot whose own drives say more: little, but where they agree with it."""
+        return ExpectedScatter(self.deviations, agreeing=self.degrees)
 
     def of(self, candidate: Candidate) -> float:
         """Deviation of a candidate's sizes, in least sizes that matter."""

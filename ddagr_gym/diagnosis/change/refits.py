@@ -20,7 +20,8 @@ from ddagr_gym.diagnosis.change.drive_fit import ITERATIONS
 from ddagr_gym.diagnosis.change.drive_scan import named_in, scan_drive
 from ddagr_gym.diagnosis.change.model import MOST_NEAR, Model, farthest
 from ddagr_gym.diagnosis.change.ordinary import Comparison, Scores
-from ddagr_gym.diagnosis.change.shifts import Shift, explained, shift_of, sizes_of
+from ddagr_gym.diagnosis.change.shifts import Shift, shift_of
+from ddagr_gym.diagnosis.change.sizes import explained, sizes_of
 from ddagr_gym.diagnosis.change.soil_place import patch_of_change
 from ddagr_gym.diagnosis.search.initial_guess import (
     first_guess,

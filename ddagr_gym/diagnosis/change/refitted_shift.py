@@ -13,10 +13,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ddagr_gym.diagnosis.change.between_drives import degrees_of_freedom
 from ddagr_gym.diagnosis.change.contrasts import contrast_sizes
 from ddagr_gym.diagnosis.change.drive_scan import elsewhere, named_in
 from ddagr_gym.diagnosis.change.ordinary import Scores
-from ddagr_gym.diagnosis.change.shifts import Shift, Sizes, degrees_of_freedom, probability_of, sizes_of
+from ddagr_gym.diagnosis.change.shifts import Shift, probability_of
+from ddagr_gym.diagnosis.change.sizes import Sizes, sizes_of
 from ddagr_gym.diagnosis.search.candidates import moved_field
 from ddagr_gym.physics.effects import Effect
 

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from ddagr_gym.diagnosis.answer.drive_series import PARAMETER, SizePoint
 from ddagr_gym.diagnosis.change.model import Model
 from ddagr_gym.diagnosis.change.ordinary import Comparison
-from ddagr_gym.diagnosis.change.shifts import Shift, sizes_of
+from ddagr_gym.diagnosis.change.shifts import Shift
+from ddagr_gym.diagnosis.change.sizes import sizes_of
 from ddagr_gym.diagnosis.search.candidates import Candidate, moved_field
 from ddagr_gym.identification.problem import Problem
 

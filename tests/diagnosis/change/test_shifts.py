@@ -6,20 +6,13 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from ddagr_gym.diagnosis.change.between_drives import degrees_of_freedom
 from ddagr_gym.diagnosis.change.drive_scan import Compared, scattered
 from ddagr_gym.diagnosis.change.expected_scatter import EXPECTED_DRIVES, ExpectedScatter
 from ddagr_gym.diagnosis.change.ordinary import Comparison, Scores
 from ddagr_gym.diagnosis.change.refitted_shift import refitted_shift, times_farther
-from ddagr_gym.diagnosis.change.shifts import (
-    LEVEL,
-    degrees_of_freedom,
-    explained,
-    family_probability,
-    shift_of,
-    single_level,
-    sizes_of,
-    windows_in_effect,
-)
+from ddagr_gym.diagnosis.change.shifts import LEVEL, family_probability, shift_of, single_level
+from ddagr_gym.diagnosis.change.sizes import explained, sizes_of, windows_in_effect
 from ddagr_gym.diagnosis.result.detectable import least_multiple
 from ddagr_gym.diagnosis.search.candidates import candidates_of
 from ddagr_gym.physics.effects.base import DriveExtent
@@ -179,6 +172,30 @@ def test_degrees_of_freedom_are_those_of_what_is_known_worst():
     assert degrees_of_freedom(np.eye(1), 0.5 * np.eye(1), 6.0, 40.0) == pytest.approx(1.0 / (0.25 / 6.0 + 0.25 / 39.0))
     assert degrees_of_freedom(np.eye(1), np.zeros((1, 1)), 26.0, 12.0) == 26.0
     assert degrees_of_freedom(np.eye(1), np.zeros((1, 1)), 6.0, 0.0) == 6.0
+
+
+CALIBRATED = ExpectedScatter({}, 24.0).of_calibrations
+"""As simulated pairs tell it, for a robot with ordinary drives of its own."""
+
+
+def test_ordinary_drives_that_agree_with_the_expectation_have_its_degrees_of_freedom():
+    """Scatter of a fifth of the least size is expected: three drives scatter by half of it, or by four times it."""
+    drive = scores(BIAS.keys[0], 10.0 * LEAST, 0.02 * LEAST)
+    alike, apart = (
+        tuple(scores(BIAS.keys[0], size * LEAST, 0.02 * LEAST) for size in (-spread, 0.0, spread))
+        for spread in (0.1, 0.8)
+    )
+    agreeing, scattering = (shift_of(BIAS, drive, Comparison(found, expected=CALIBRATED)) for found in (alike, apart))
+    assert agreeing.drives == pytest.approx(26.0)
+    assert scattering.drives == pytest.approx(EXPECTED_DRIVES + 2.0)
+    # no less than what is expected, even where the drives agree better
+    assert np.sqrt(agreeing.between[0, 0]) == pytest.approx(0.2 * np.sqrt(4.0 / 3.0) * LEAST, rel=0.01)
+    assert shift_of(BIAS, drive, Comparison(alike)).drives == pytest.approx(EXPECTED_DRIVES + 2.0)
+
+
+def test_a_single_ordinary_drive_agrees_with_nothing():
+    drive, ordinary = (scores(BIAS.keys[0], size, 0.02 * LEAST) for size in (10.0, 0.0))
+    assert shift_of(BIAS, drive, Comparison((ordinary,), expected=CALIBRATED)).drives == EXPECTED_DRIVES
 
 
 def test_windows_that_show_nothing_do_not_count():
