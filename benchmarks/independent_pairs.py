@@ -104,7 +104,7 @@ def compared(pair: Pair) -> dict[str, Any]:
             {
                 "effect": item.name,
                 "has_sizes": item.candidate.has_sizes,
-                "drives": [_written(sizes, least) for sizes in found if sizes is not None],
+                "drives": [written_sizes(sizes, least) for sizes in found if sizes is not None],
             }
         )
     comparison = known.comparison(GROUND)
@@ -117,7 +117,7 @@ def compared(pair: Pair) -> dict[str, Any]:
     }
 
 
-def _written(sizes: Sizes, least: Array) -> dict[str, Any]:
+def written_sizes(sizes: Sizes, least: Array) -> dict[str, Any]:
     """Sizes of a drive in least sizes that matter, the drive after first."""
     square = np.outer(least, least)
     return {

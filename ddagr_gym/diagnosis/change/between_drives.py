@@ -30,6 +30,7 @@ class Away:
     between: Array
     degrees: float
     drives: float
+    few: float
 
 
 def away_from(
@@ -52,6 +53,7 @@ def away_from(
     """
     expected, known = here.between + structure, expectation.degrees
     mean, spread, of_mean, degrees = _ordinary_scatter(others, structure, least)
+    few = known + degrees
     if degrees >= FEWEST and largest_share(spread, expected) <= 1.0:
         known, spread = max(known, expectation.agreeing), expected
     scatter = (known * expected + degrees * spread) / (known + degrees)
@@ -60,7 +62,7 @@ def away_from(
     between = scatter + (scatter + of_mean) / (degrees + 1.0)
     whole, drives = here.within + between, known + degrees
     freedom = degrees_of_freedom(whole, between, drives, here.windows)
-    return Away(here.value - mean, mean, whole, between, freedom, drives)
+    return Away(here.value - mean, mean, whole, between, freedom, drives, few)
 
 
 def degrees_of_freedom(covariance: Array, between: Array, drives: float, windows: float) -> float:

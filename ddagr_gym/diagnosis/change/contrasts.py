@@ -131,9 +131,8 @@ def _shift(compared: Compared, found: Contrast, looks: int) -> Shift:
     covariance = sizes.within + between
     probability = probability_of(candidate.has_sizes, sizes.value, covariance, found.degrees)
     nothing = np.zeros(len(compared.keys))
-    return Shift(
-        compared, sizes.value, nothing, covariance, between, found.degrees, probability, found.degrees, looks, True
-    )
+    degrees = (found.degrees, probability, found.degrees, found.degrees)
+    return Shift(compared, sizes.value, nothing, covariance, between, *degrees, looks, apart=True)
 
 
 def in_order(windows: WindowSet) -> Integers:

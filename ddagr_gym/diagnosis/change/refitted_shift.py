@@ -43,7 +43,7 @@ def refitted_shift(
         keys: of the columns of its fields, by field.
         scores: of the drive at the refit.
         stretched: whether sizes in ordinary drives, which are first steps too, are taken to scatter more by as much as
-            the refit goes farther than the first step.
+            the refit goes farther than the first step, and known no better than few drives tell.
     """
     names, away = _fields_of_its_own(shift)
     if not names or not set(names) <= keys.keys() or any(_at_bound(effect, name) for name in names):
@@ -56,8 +56,8 @@ def refitted_shift(
     farther = _farther(shift, size) if stretched else 1.0
     between = farther**2 * shift.between
     covariance = further.within / np.outer(away, away) + between
-    degrees = shift.degrees
-    if not shift.apart:
+    degrees = shift.few if stretched else shift.degrees
+    if not (stretched or shift.apart):
         degrees = degrees_of_freedom(covariance, between, shift.drives, further.windows)
     probability = probability_of(True, value, covariance, degrees)
     return replace(shift, value=value, covariance=covariance, degrees=degrees, probability=probability)

@@ -67,7 +67,8 @@ class Shift:
         between: (k, k) share of ordinary drives in it.
         degrees: of freedom, equation (3).
         probability: of an ordinary drive to show as much, for this candidate alone.
-        drives: degrees of freedom with which the share of ordinary drives is known, d0 + d_r.
+        drives: degrees of freedom with which the share of ordinary drives is known, d'.
+        few: the same without equation (4), d0 + d_r.
         looks: as how many tests it counts: in so many parts of the drive it was looked for.
         apart: whether it is against the rest of the drive in place of ordinary drives.
     """
@@ -80,6 +81,7 @@ class Shift:
     degrees: float
     probability: float
     drives: float
+    few: float
     looks: int = 1
     apart: bool = False
 
@@ -151,7 +153,9 @@ def shift_of(
     pieces = _sizes_in(compared, ordinary.pieces, beside_ordinary) if len(others) == 1 else []
     away = away_from(here, others, pieces, structure, least, ordinary.expected)
     probability = probability_of(compared.candidate.has_sizes, away.value, away.covariance, away.degrees)
-    return Shift(compared, away.value, away.mean, away.covariance, away.between, away.degrees, probability, away.drives)
+    return Shift(
+        compared, away.value, away.mean, away.covariance, away.between, away.degrees, probability, away.drives, away.few
+    )
 
 
 def _sizes_in(compared: Compared, drives: Sequence[Scores], beside: Sequence[str]) -> list[Sizes]:

@@ -30,7 +30,7 @@ def test_a_size_of_which_nothing_is_known_has_no_interval():
 def test_what_a_first_step_shows_in_part_must_be_larger_to_be_found():
     bias = Compared(candidates_of(GyroBias, DriveExtent(), 0)[0], ("gyro_bias 0",))
     one = np.eye(1)
-    shift = Shift(bias, 2.0 * one[0], 0.0 * one[0], one, 0.5 * one, 8.0, 0.1, 8.0)
+    shift = Shift(bias, 2.0 * one[0], 0.0 * one[0], one, 0.5 * one, 8.0, 0.1, 8.0, 8.0)
     usual, partly = (_size_shifts(shift, 40, farther)["bias"] for farther in (1.0, 3.0))
     assert partly.least_detectable == pytest.approx(3.0 * usual.least_detectable)
     # nothing beyond what exists is said to be found

@@ -17,7 +17,7 @@ ONE = np.ones(1)
 
 
 def shift(name: str, probability: float, looks: int = 1) -> Shift:
-    return Shift(SimpleNamespace(name=name), ONE, ONE, np.eye(1), np.eye(1), 10.0, probability, 10.0, looks)
+    return Shift(SimpleNamespace(name=name), ONE, ONE, np.eye(1), np.eye(1), 10.0, probability, 10.0, 10.0, looks)
 
 
 def model_with(looks: int) -> Model:

@@ -242,6 +242,10 @@ def test_a_refit_finds_the_size_that_a_first_step_found_in_part():
     assert found.covariance[0, 0] == pytest.approx(0.01 + farther**2 * before.between[0, 0], rel=1e-3)
     assert found.distance > before.distance
     assert found.probability < before.probability
+    agreeing = shift_of(BIAS, scores(BIAS.keys[0], 4.0, 0.5), Comparison(ALIKE.drives, expected=CALIBRATED))
+    assert agreeing.drives > 20.0
+    refits = [refitted_shift(agreeing, GyroBias(0.03), {"bias": "named 0"}, refit, way) for way in (True, False)]
+    assert [item.degrees for item in refits] == pytest.approx([EXPECTED_DRIVES + 2.0, agreeing.drives], rel=0.01)
     plain = refitted_shift(before, GyroBias(0.03), {"bias": "named 0"}, refit)
     assert plain.covariance[0, 0] == pytest.approx(0.01 + before.between[0, 0], rel=1e-6)
 
