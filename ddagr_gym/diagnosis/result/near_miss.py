@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from statistics import median
+
 from ddagr_gym.diagnosis.answer.amounts import Amount, size
 from ddagr_gym.diagnosis.answer.change import CALIBRATION, Change, EffectShift
 from ddagr_gym.diagnosis.wording import in_sentence
@@ -10,7 +12,10 @@ NEAR = 0.5
 """Share of its limit from which the nearest effect is said (ours)."""
 
 FEW_DRIVES = 5
-"""Ordinary drives below which limits are said to be wide (ours): with three they are twice those of many."""
+"""Ordinary drives below which limits may be said to be wide (ours): with three they are up to twice those of many."""
+
+FEW_DEGREES = 12.0
+"""Degrees of freedom of most effects below which limits then are wide (ours): a sixth above those of 26 degrees."""
 
 
 def by_distance(change: Change) -> list[EffectShift]:
@@ -66,9 +71,10 @@ def _shift_in_words(item: EffectShift) -> str:
 
 
 def few_drives_in_words(change: Change) -> str:
-    """That limits are wide with so few ordinary drives, and what shows smaller changes; "" where there are enough."""
+    """That limits are wide with so few ordinary drives, and what shows smaller changes; "" where they are not."""
     count = len(change.ordinary)
-    if change.against != CALIBRATION or count >= FEW_DRIVES:
+    narrow = bool(change.shifts) and median(item.degrees for item in change.shifts) >= FEW_DEGREES
+    if change.against != CALIBRATION or count >= FEW_DRIVES or narrow:
         return ""
     return (
         f"Only {count} ordinary drive{'s say' if count > 1 else ' says'} what is usual, so that limits are wide: a "

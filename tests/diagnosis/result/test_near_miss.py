@@ -45,4 +45,6 @@ def test_what_a_fit_refuted_is_not_called_near():
 def test_few_ordinary_drives_are_said_to_see_little():
     assert few_drives_in_words(CHANGE).startswith("Only 3 ordinary drives say what is usual, so that limits are wide")
     assert few_drives_in_words(replace(CHANGE, ordinary=tuple("abcde"))) == ""
+    known = tuple(replace(item, degrees=26.0) for item in CHANGE.shifts)
+    assert few_drives_in_words(replace(CHANGE, shifts=known)) == ""
     assert few_drives_in_words(replace(CHANGE, against=BEFORE)) == ""
