@@ -11,6 +11,7 @@ Reading order, each module using those before it::
     motor_currents   what motor currents measure, up to unknown constants
     window_model     the simulator over windows: predictions and their derivatives
     least_squares    the linearised problem: elimination, robust weights, bounded step, deviations
+    reading_effects  what effects of the sensors make of a bias
     problem          residuals, sensitivities and local unknowns of one fit
     effect_parameters, size_prior    assumed missing physics as parameters
     gauss_newton     the iteration

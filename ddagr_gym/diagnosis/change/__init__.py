@@ -1,6 +1,6 @@
 """What changed against a robot's ordinary drives: shifts of estimates instead of gains of likelihood.
 
-    ordinary -> drive_fit -> drive_scan -> reference -> shifts -> naming -> conclusion
+    ordinary -> drive_fit -> drive_scan -> reference -> sizes -> between_drives -> shifts -> naming -> conclusion
 
 The size of every effect is estimated jointly with what differs between ordinary drives (robot, soil, biases, with the
 scatter of a calibration as their prior), to first order about the refitted calibrated robot. The same estimate on every
