@@ -54,8 +54,8 @@ def away_from(
     expected, known = here.between + structure, expectation.degrees
     mean, spread, of_mean, degrees = _ordinary_scatter(others, structure, least)
     few = known + degrees
-    if degrees >= FEWEST and largest_share(spread, expected) <= 1.0:
-        known, spread = max(known, expectation.agreeing), expected
+    if expectation.agreeing > known and degrees >= FEWEST and largest_share(spread, expected) <= 1.0:
+        known, spread = expectation.agreeing, expected
     scatter = (known * expected + degrees * spread) / (known + degrees)
     if pieces:
         scatter = _widened(scatter, structure, pieces, least, known)
