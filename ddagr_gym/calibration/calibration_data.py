@@ -51,6 +51,7 @@ class CalibrationData:
         notes: of each drive, sentences on what was mended.
         currents: how the motors' currents follow, None where none is compared; the windows hold them then.
         slopes: of the grounds that surely slope.
+        holds: of each drive, time for which sensors repeat their readings, by sensor [s].
     """
 
     robot: Robot
@@ -61,6 +62,7 @@ class CalibrationData:
     notes: tuple[tuple[str, ...], ...]
     currents: CurrentModel | None = None
     slopes: Mapping[str, GroundSlope] = field(default_factory=dict)
+    holds: tuple[Mapping[str, float], ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -112,7 +114,7 @@ def prepare_drives(
     Raises:
         InputError: a drive with too few windows.
     """
-    mended, notes = zip(*(_mended(recording, settings.seed) for recording in recordings), strict=True)
+    mended, notes, holds = zip(*(_mended(recording, settings.seed) for recording in recordings), strict=True)
     prepared = prepare(mended, robot, np.random.default_rng(settings.seed))
     windows = cut_windows(
         prepared.recordings,
@@ -136,19 +138,19 @@ def prepare_drives(
     windows = with_presumed_past(windows)
     if currents is not None:
         windows = with_currents(windows, prepared.recordings)
-    data = CalibrationData(robot, dict(soils), prepared, tuple(grounds), windows, notes, currents)
+    data = CalibrationData(robot, dict(soils), prepared, tuple(grounds), windows, notes, currents, holds=holds)
     return replace(data, slopes=slopes_of(prepared.recordings, windows, data.drives_on, robot.outer_radius))
 
 
-def _mended(recording: Recording, seed: int) -> tuple[Recording, tuple[str, ...]]:
-    """A drive without the faults that show in its values, and sentences on them."""
+def _mended(recording: Recording, seed: int) -> tuple[Recording, tuple[str, ...], dict[str, float]]:
+    """A drive without the faults that show in its values, sentences on them, and how long sensors repeat readings."""
     found = mend_recordings([recording], seed)
     said = [f"the {item.sensor} repeats its readings: repeats are left out." for item in found.repeated]
     said += [f"{in_sentence(fault.name)}: readings were put where they belong." for fault in found.channel_faults]
     said += ["the gyro turns the wrong way: its sign was turned."] if found.reversed_gyro is not None else []
     faster = [item for item in straight_finding(found.recordings[0]) if item.status is Status.SUSPICIOUS]
     said += [f"{item.meaning} {item.remedy}" for item in faster]
-    return found.recordings[0], tuple(said)
+    return found.recordings[0], tuple(said), found.holds
 
 
 def _duration(recordings: Sequence[Recording], wanted: float) -> float:

@@ -132,7 +132,9 @@ def ordinary_drives(
         Task(item.name, scan_ordinary, (drive, weighing, threads), f"ordinary {number}")
         for number, (item, drive) in enumerate(zip(without, drives, strict=True))
     ]
-    references = tuple(steps.results("every effect of the library in each drive", tasks))
+    scanned = steps.results("every effect of the library in each drive", tasks)
+    holds = [data.holds[int(forecast.windows.recording[0])] for forecast in made]
+    references = tuple(replace(item, holds=own) for item, own in zip(scanned, holds, strict=True))
     on_grounds = {ground: together.on(drives, model.values) for ground, drives in data.drives_on.items()}
     return Ordinary(weighing, references, on_grounds)
 

@@ -134,6 +134,7 @@ def _reference(item: Reference) -> dict[str, Any]:
         "moved": {name: _plain(value) for name, value in item.moved.items()},
         "column_map": item.column_map,
         "period": _plain(item.period),
+        "holds": None if item.holds is None else {name: _plain(time) for name, time in item.holds.items()},
         "on_ground": _on_ground(item.on_ground),
     }
 
@@ -152,7 +153,12 @@ def _reference_of(mapping: Mapping[str, Any]) -> Reference:
         str(mapping.get("column_map", "")),
         on_ground=_on_ground_of(mapping.get("on_ground", {})),
         period=float(mapping.get("period", 0.0)),
+        holds=_holds_of(mapping.get("holds")),
     )
+
+
+def _holds_of(mapping: Mapping[str, float] | None) -> dict[str, float] | None:
+    return None if mapping is None else {str(name): float(time) for name, time in mapping.items()}
 
 
 def _on_ground(item: RobotOnGround) -> dict[str, dict[str, float]]:

@@ -30,7 +30,16 @@ ORDINARY = Ordinary(
     replace(WEIGHING, turning=0.2),
     (
         Reference(
-            "one.csv", "sand", False, scores(), scores(), robot=ROBOT, soil=SOIL, moved={"mass": 1.5}, period=0.025
+            "one.csv",
+            "sand",
+            False,
+            scores(),
+            scores(),
+            robot=ROBOT,
+            soil=SOIL,
+            moved={"mass": 1.5},
+            period=0.025,
+            holds={"pose": 0.15},
         ),
         Reference("two.csv", "sand", False, scores(), scores(), on_ground=RobotOnGround({"a": 0.5}, {"a": 0.25})),
     ),
@@ -50,6 +59,7 @@ def test_weights_and_scores_read_back(tmp_path):
     assert (first.robot, first.soil) == (ROBOT, SOIL)
     assert first.moved == {"mass": 1.5}
     assert (first.period, found.references[1].period) == (0.025, 0.0)
+    assert (first.holds, found.references[1].holds) == ({"pose": 0.15}, None)
     assert (found.references[1].robot, found.references[1].soil) == (None, None)
     assert found.references[1].on_ground == ORDINARY.references[1].on_ground
     assert found.on_grounds == ORDINARY.on_grounds
@@ -60,11 +70,11 @@ def test_a_bank_of_the_second_version_is_read(tmp_path):
     save_ordinary(ORDINARY, path)
     body = json.loads(path.read_text())
     del body["ordinary"]["on_grounds"], body["ordinary"]["references"][1]["on_ground"]
-    del body["ordinary"]["references"][0]["period"]
+    del body["ordinary"]["references"][0]["period"], body["ordinary"]["references"][0]["holds"]
     path.write_text(json.dumps({**body, "version": 2, "runs": [{"kind": "real"}]}))
     found = load_ordinary(path)
     assert [item.drive for item in found.references] == ["one.csv", "two.csv"]
-    assert found.references[0].period == 0.0
+    assert (found.references[0].period, found.references[0].holds) == (0.0, None)
     assert (found.on_grounds, found.references[1].on_ground) == ({}, RobotOnGround())
 
 

@@ -117,6 +117,7 @@ class Reference:
         misfit: mean square of what the fit leaves of each channel; none in files of calibrations.
         misfit_error: relative standard error of that by the windows.
         period: between its rows [s]; 0 in files of before.
+        holds: by sensor, time for which it repeats its readings [s]; None in files of before.
     """
 
     drive: str
@@ -133,6 +134,7 @@ class Reference:
     misfit_error: Mapping[str, float] = field(default_factory=dict)
     on_ground: RobotOnGround = field(default_factory=RobotOnGround)
     period: float = 0.0
+    holds: Mapping[str, float] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,6 +232,16 @@ class OrdinaryRobot:
         drives, pieces = ([item.other_ground for item in found] for found in (self.references, self.pieces))
         unnamed = {**dict.fromkeys(SOIL_EFFECTS, OF_ANOTHER_GROUND), **new}
         return Comparison(tuple(drives), tuple(pieces), self.other_scatter, unnamed, moved)
+
+    @property
+    def usual_holds(self) -> dict[str, float] | None:
+        """Longest time for which ordinary drives repeat readings, by sensor [s]; None in files of before."""
+        found: dict[str, float] = {}
+        for item in self.references:
+            if item.holds is None:
+                return None
+            found = {**found, **{name: max(time, found.get(name, 0.0)) for name, time in item.holds.items()}}
+        return found
 
     @property
     def _unscanned(self) -> dict[str, str]:

@@ -57,6 +57,11 @@ class MendedRecordings:
         return (*self.repeated, *self.left_out)
 
     @property
+    def holds(self) -> dict[str, float]:
+        """Time for which their readings are repeated, by sensor [s]."""
+        return {item.sensor: item.duration for item in self.held}
+
+    @property
     def names(self) -> tuple[str, ...]:
         """Effects and faults that were found in the values themselves."""
         repeated = ("sensor_hold",) if self.held else ()

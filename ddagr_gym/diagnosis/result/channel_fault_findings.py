@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from ddagr_gym.diagnosis.answer.verdict import NONE, UNKNOWN, Diagnosis, Estimate, Finding
@@ -14,6 +14,9 @@ from ddagr_gym.recordings.checks.findings import CheckFinding
 
 LONGER = 1.5
 """Times as long as before for which a reading must be repeated to be a change (ours): holds jitter."""
+
+STAMP = 1e-3
+"""How well stamps tell a duration [s] (ours)."""
 
 
 def channel_fault_findings(faults: Sequence[ChannelFault]) -> list[Finding]:
@@ -40,21 +43,23 @@ def repeat_findings(repeated: Sequence[RepeatedReadings]) -> list[Finding]:
     return [Finding("sensor_hold", parameters, repeats, 0.0, repeats**0.5, repeats, {}, {"sensor_hold": 1.0})]
 
 
-def new_holds(mended: MendedRecordings, before: MendedRecordings | None) -> tuple[RepeatedReadings, ...]:
-    """Sensors that repeat their readings for longer than in drives from before; none where these are not at hand.
+def new_holds(mended: MendedRecordings, usual: Mapping[str, float] | None) -> tuple[RepeatedReadings, ...]:
+    """Sensors that repeat their readings for longer than in ordinary drives; none where that is not known.
 
     Args:
         mended: drives that are compared.
-        before: those that they are compared with.
+        usual: time for which readings are repeated in those that they are compared with, by sensor [s].
     """
-    if before is None:
+    if usual is None:
         return ()
-    usual = {item.sensor: item.duration for item in before.held}
-    return tuple(item for item in mended.held if item.duration > LONGER * usual.get(item.sensor, 0.0))
+    return tuple(item for item in mended.held if item.duration > LONGER * usual.get(item.sensor, 0.0) + STAMP)
 
 
 def with_new_faults(
-    diagnosis: Diagnosis, mended: MendedRecordings, before: MendedRecordings | None = None
+    diagnosis: Diagnosis,
+    mended: MendedRecordings,
+    before: MendedRecordings | None = None,
+    holds: Sequence[RepeatedReadings] = (),
 ) -> Diagnosis:
     """The answer of a comparison with ordinary drives, with what is wrong with the channels named first.
 
@@ -62,12 +67,13 @@ def with_new_faults(
         diagnosis: of the mended drives.
         mended: the drives.
         before: those that they are compared with, whose faults are no change; None where they are not at hand.
+        holds: sensors that repeat their readings for longer than usual.
     """
     usual = () if before is None else before.names
     faults = [fault for fault in mended.channel_faults if fault.name not in usual]
     known = {(item.check, item.channel) for item in (() if before is None else before.contradictions)}
     new = tuple(item for item in mended.contradictions if (item.check, item.channel) not in known)
-    seen = [*channel_fault_findings(faults), *repeat_findings(new_holds(mended, before))]
+    seen = [*channel_fault_findings(faults), *repeat_findings(holds)]
     if seen and diagnosis.change is not None:
         findings = (*seen, *diagnosis.findings)
         names = tuple(name for name in diagnosis.verdict if name not in (NONE, UNKNOWN))

@@ -21,6 +21,7 @@ from ddagr_gym.recordings.schema import Recording, RecordingMeta
 
 ROBOT, SOIL = get_robot("ddagr"), get_soil("thesis_a1")
 SCORES = Scores(("a 0",), np.zeros(1), np.eye(1), np.eye(1), np.eye(1))
+HELD, LONGER = {"pose": 0.1, "encoders": 0.2}, {"pose": 0.15}
 DEVIATIONS = dict.fromkeys(field_deviations(), 0.01)
 
 
@@ -126,6 +127,12 @@ def test_commands_of_another_logger_may_be_a_sample_apart(robot):
     for column_map, prior in (("steps", 0.01), ("bag", np.hypot(0.01, 0.05))):
         free = robot.uncertain("sand", [recording("steps"), recording(column_map)])
         assert {p.name: p.prior for p in free}["command_delay"] == pytest.approx(prior)
+
+
+def test_sensors_may_repeat_readings_for_as_long_as_in_any_ordinary_drive(robot):
+    assert robot.usual_holds is None
+    drives = (replace(item, holds=held) for item, held in zip(robot.references, ({}, HELD, LONGER), strict=True))
+    assert replace(robot, references=tuple(drives)).usual_holds == {"pose": 0.15, "encoders": 0.2}
 
 
 def test_effects_that_came_after_a_calibration_are_not_compared(robot):

@@ -26,8 +26,8 @@ def mended(**held: float) -> MendedRecordings:
     ],
 )
 def test_a_hold_is_new_where_it_is_longer_than_before(after, before, new):
-    assert [item.sensor for item in new_holds(mended(**after), mended(**before))] == new
+    assert [item.sensor for item in new_holds(mended(**after), mended(**before).holds)] == new
 
 
-def test_where_drives_from_before_are_not_at_hand_no_hold_is_called_new():
+def test_where_it_is_not_known_what_is_usual_no_hold_is_called_new():
     assert new_holds(mended(gyro=0.2), None) == ()
