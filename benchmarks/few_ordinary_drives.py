@@ -26,7 +26,8 @@ from numpy.typing import NDArray
 
 from benchmarks.altered_changes import CONTROL
 from benchmarks.change_limits import Piece, questions
-from benchmarks.independent_pairs import written_sizes
+from benchmarks.drive_sizes import probabilities, written_effects, written_sizes
+from benchmarks.pair_scatter import least_scatter
 from benchmarks.score_concealed import share
 from benchmarks.what_changed import RESULT as CHANGES_RESULT
 from benchmarks.what_changed import Drive, answered, drives, parser_of
@@ -34,23 +35,12 @@ from ddagr_gym.calibration.ordinary_robot import load_ordinary_robot
 from ddagr_gym.diagnosis.change.between_drives import Away, away_from
 from ddagr_gym.diagnosis.change.drive_fit import moved_parameters
 from ddagr_gym.diagnosis.change.drive_scan import scan_drive
-from ddagr_gym.diagnosis.change.expected_scatter import EXPECTED_DRIVES, ExpectedScatter
+from ddagr_gym.diagnosis.change.expected_scatter import ExpectedScatter
 from ddagr_gym.diagnosis.change.measured_scatter import measured_scatter
 from ddagr_gym.diagnosis.change.ordinary import Comparison, OrdinaryRobot
 from ddagr_gym.diagnosis.change.run import fit_ordinary
-from ddagr_gym.diagnosis.change.shifts import (
-    LEVEL,
-    Pull,
-    distance_at,
-    distance_found,
-    family_probability,
-    probability_of,
-    single_level,
-)
-from ddagr_gym.diagnosis.change.sizes import Sizes, sizes_of
+from ddagr_gym.diagnosis.change.shifts import LEVEL, family_probability, least_found, single_level
 from ddagr_gym.diagnosis.preprocessing.mended_recordings import mend_recordings
-from ddagr_gym.diagnosis.result.detectable import least_multiple
-from ddagr_gym.diagnosis.result.uncertainty import STRUCTURE, STRUCTURE_OF_LIMIT
 from ddagr_gym.diagnosis.wording import title
 from ddagr_gym.errors import InputError
 from ddagr_gym.files import write_json
@@ -86,14 +76,8 @@ def _scan(drive: Drive, ordinary: OrdinaryRobot) -> dict[str, Any]:
     known = ordinary.without(drive.file).seen_by(mended.recordings, drive.ground)
     problem, fitted = fit_ordinary(mended, known, drive.ground)
     scan, comparison = scan_drive(problem, fitted), known.comparison(drive.ground)
-    effects = []
-    for item in scan.compared:
-        found = [sizes_of(scores, item.keys, item.ridge) for scores in (scan.scores(), *comparison.drives)]
-        sizes = [one for one in found if one is not None]
-        if len(sizes) == len(found) and item.name not in comparison.unnamed:
-            least = np.array([least_multiple(item.candidate, k) for k in range(len(item.keys))])
-            written = [{**written_sizes(one, least), "windows": one.windows} for one in sizes]
-            effects.append({"effect": item.name, "has_sizes": item.candidate.has_sizes, "drives": written})
+    named = [item for item in scan.compared if item.name not in comparison.unnamed]
+    effects = written_effects(named, (scan.scores(), *comparison.drives))
     return {"effects": effects, "moved": [moved_parameters(problem, fitted), *map(dict, comparison.moved)]}
 
 
@@ -108,29 +92,20 @@ def compared(item: Mapping[str, Any], chosen: Sequence[int], ground: str, rule: 
     """
     measured = measured_scatter()
     expected = (measured.same_ground if ground else measured.other_ground).of_calibrations
-    usual = STRUCTURE if item["has_sizes"] else STRUCTURE_OF_LIMIT
-    here, *others = (_sizes(item["drives"][k], rule) for k in (0, *(k + 1 for k in chosen)))
+    here, *others = (
+        written_sizes(entry, entry["windows"] if rule == NOW else 0.0)
+        for entry in (item["drives"][0], *(item["drives"][number + 1] for number in chosen))
+    )
     k = len(here.value)
-    structure = expected.deviations.get(item["effect"], usual) ** 2 * np.eye(k)
+    structure = expected.deviations.get(item["effect"], least_scatter(item["has_sizes"])) ** 2 * np.eye(k)
     return away_from(here, others, (), structure, np.ones(k), expected if rule == NOW else ExpectedScatter())
-
-
-def _sizes(entry: Mapping[str, Any], rule: str) -> Sizes:
-    arrays = (np.array(entry[name]) for name in ("value", "within", "between"))
-    return Sizes(*arrays, windows=entry["windows"] if rule == NOW else 0.0)
 
 
 def surest(scan: Mapping[str, Any], chosen: Sequence[int], rule: str) -> tuple[float, str]:
     """Probability of an ordinary drive to show anything as far away, and what is; arguments as of :func:`compared`."""
-    found: dict[str, float] = {}
-    for item in scan["effects"]:
-        away = compared(item, chosen, scan["ground"], rule)
-        own = probability_of(item["has_sizes"], away.value, away.covariance, away.degrees)
-        found[item["effect"]] = min(own, found.get(item["effect"], 1.0))
-    moved = tuple(scan["moved"][k + 1] for k in chosen)
+    moved = tuple(scan["moved"][number + 1] for number in chosen)
     against = Comparison((None,) * len(chosen), moved=moved)  # type: ignore[arg-type]
-    for name, move in scan["moved"][0].items():
-        found[name] = Pull(name, move / against.usual_move(name), EXPECTED_DRIVES + len(chosen) - 1.0).probability
+    found = probabilities(scan, lambda item: compared(item, chosen, scan["ground"], rule), against)
     name = min(found, key=found.__getitem__)
     return family_probability(found[name], _tests(scan)), name
 
@@ -141,9 +116,7 @@ def least_told(scan: Mapping[str, Any], chosen: Sequence[int], rule: str) -> dic
     for item in scan["effects"]:
         if item["has_sizes"] and item["effect"] not in found:
             away = compared(item, chosen, scan["ground"], rule)
-            k = len(away.value)
-            reach = distance_found(distance_at(single_level(_tests(scan)), k, away.degrees), k, away.degrees)
-            found[item["effect"]] = float(np.max(reach / np.sqrt(np.diag(np.linalg.inv(away.covariance)))))
+            found[item["effect"]] = float(least_found(away.covariance, away.degrees, single_level(_tests(scan))).max())
     return found
 
 

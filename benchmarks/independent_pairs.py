@@ -32,8 +32,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks import drive_sizes
 from benchmarks.changed_pairs.answers import SOIL, recordings_of
 from benchmarks.changed_pairs.plan import Pair, plan
+from benchmarks.drive_sizes import written_effects, written_sizes
 from benchmarks.pair_scatter import DEGREES, MOST, least_scatter, log_density, most_likely, rounded
 from ddagr_gym.diagnosis.change.before_drives import GROUND, robot_of_before
 from ddagr_gym.diagnosis.change.between_drives import Away, away_from
@@ -43,18 +45,8 @@ from ddagr_gym.diagnosis.change.drive_scan import scan_drive
 from ddagr_gym.diagnosis.change.expected_scatter import ExpectedScatter
 from ddagr_gym.diagnosis.change.ordinary import Comparison
 from ddagr_gym.diagnosis.change.run import fit_ordinary
-from ddagr_gym.diagnosis.change.shifts import (
-    LEVEL,
-    Pull,
-    distance_at,
-    distance_found,
-    family_probability,
-    probability_of,
-    single_level,
-)
-from ddagr_gym.diagnosis.change.sizes import Sizes, sizes_of
+from ddagr_gym.diagnosis.change.shifts import LEVEL, family_probability, least_found, single_level
 from ddagr_gym.diagnosis.preprocessing.mended_recordings import mend_recordings
-from ddagr_gym.diagnosis.result.detectable import least_multiple
 from ddagr_gym.diagnosis.wording import title
 from ddagr_gym.files import write_text
 from ddagr_gym.identification.misfit import channel_misfit
@@ -69,8 +61,6 @@ Array = NDArray[np.float64]
 RESULT = Path(__file__).resolve().parent / "results" / "independent_pairs.json"
 COMMAND = "python -m benchmarks.independent_pairs"
 SEED = 1
-DIGITS = 4
-"""Of the sizes that are written."""
 LEAST_MOVE, MOST_MOVE = 1.0, 10.0
 """Of the prior deviations that are tried."""
 MANY = 1e6
@@ -92,48 +82,19 @@ def compared(pair: Pair) -> dict[str, Any]:
     known = robot_of_before(mend_recordings(before), robot, get_soil(SOIL)).seen_by(mended.recordings, GROUND)
     problem, fitted = fit_ordinary(mended, known, GROUND)
     scan = scan_drive(problem, fitted)
-    scores = scan.scores()
-    effects = []
-    for item in scan.compared:
-        drives = [scores, *(reference.known_ground for reference in known.references)]
-        found = [sizes_of(drive, item.keys, item.ridge) for drive in drives]
-        if any(sizes is None for sizes in found):
-            continue
-        least = np.array([least_multiple(item.candidate, k) for k in range(len(item.keys))])
-        effects.append(
-            {
-                "effect": item.name,
-                "has_sizes": item.candidate.has_sizes,
-                "drives": [written_sizes(sizes, least) for sizes in found if sizes is not None],
-            }
-        )
     comparison = known.comparison(GROUND)
     return {
         "pair": pair.name,
         "structure": pair.case.structure,
-        "effects": effects,
+        "effects": written_effects(scan.compared, (scan.scores(), *comparison.drives)),
         "moved": [moved_parameters(problem, fitted), *map(dict, comparison.moved)],
         "misfits": [channel_misfit(problem, fitted), *map(dict, comparison.misfits)],
     }
 
 
-def written_sizes(sizes: Sizes, least: Array) -> dict[str, Any]:
-    """Sizes of a drive in least sizes that matter, the drive after first."""
-    square = np.outer(least, least)
-    return {
-        "value": rounded(sizes.value / least, DIGITS),
-        "within": [rounded(row, DIGITS) for row in sizes.within / square],
-        "between": [rounded(row, DIGITS) for row in sizes.between / square],
-    }
-
-
-def _sizes(mapping: Mapping[str, Any]) -> Sizes:
-    return Sizes(*(np.array(mapping[name]) for name in ("value", "within", "between")))
-
-
 def _away(item: Mapping[str, Any], scatter: float, known: float) -> Away:
     """Sizes of one candidate in the drive after against those before."""
-    here, *others = (_sizes(drive) for drive in item["drives"])
+    here, *others = (written_sizes(drive) for drive in item["drives"])
     k = len(here.value)
     return away_from(here, others, (), scatter**2 * np.eye(k), np.ones(k), ExpectedScatter(degrees=known))
 
@@ -201,15 +162,12 @@ def probabilities(pair: Mapping[str, Any], expected: ExpectedScatter) -> dict[st
         pair: of :func:`compared`.
         expected: scatter before any data.
     """
-    found: dict[str, float] = {}
-    for item in pair["effects"]:
+
+    def away(item: Mapping[str, Any]) -> Away:
         usual = least_scatter(item["has_sizes"])
-        away = _away(item, expected.deviations.get(item["effect"], usual), expected.degrees)
-        own = probability_of(item["has_sizes"], away.value, away.covariance, away.degrees)
-        found[item["effect"]] = min(own, found.get(item["effect"], 1.0))
-    against = _comparison(pair, expected)
-    for name, moved in pair["moved"][0].items():
-        found[name] = Pull(name, moved / against.usual_move(name), against.move_degrees).probability
+        return _away(item, expected.deviations.get(item["effect"], usual), expected.degrees)
+
+    found = drive_sizes.probabilities(pair, away, _comparison(pair, expected))
     for rise in channel_rises(pair["misfits"][0], pair["misfits"][1:], expected):
         found[rise.channel] = rise.probability
     return found
@@ -262,9 +220,7 @@ def least_by_noise(pairs: Sequence[Mapping[str, Any]]) -> dict[str, list[float]]
 
 def _least_by_noise(item: Mapping[str, Any], tests: int) -> Array:
     here, *others = (np.array(drive["within"]) for drive in item["drives"])
-    noise = here + np.mean(others, axis=0) / len(others)
-    limit = distance_at(single_level(tests), len(here), MANY)
-    return np.asarray(distance_found(limit, len(here), MANY) / np.sqrt(np.diag(np.linalg.inv(noise))))
+    return least_found(here + np.mean(others, axis=0) / len(others), MANY, single_level(tests))
 
 
 def _tests(pair: Mapping[str, Any]) -> int:

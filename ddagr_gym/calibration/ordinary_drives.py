@@ -132,9 +132,7 @@ def ordinary_drives(
         Task(item.name, scan_ordinary, (drive, weighing, threads), f"ordinary {number}")
         for number, (item, drive) in enumerate(zip(without, drives, strict=True))
     ]
-    scanned = steps.results("every effect of the library in each drive", tasks)
-    holds = [data.holds[int(forecast.windows.recording[0])] for forecast in made]
-    references = tuple(replace(item, holds=own) for item, own in zip(scanned, holds, strict=True))
+    references = tuple(steps.results("every effect of the library in each drive", tasks))
     on_grounds = {ground: together.on(drives, model.values) for ground, drives in data.drives_on.items()}
     return Ordinary(weighing, references, on_grounds)
 
@@ -188,6 +186,7 @@ class _Drives:
             slope=data.slopes.get(ground),
             on_ground=self.on(beside, values) if beside else RobotOnGround(),
             logger=0.0 if recordings[number].meta.column_map in maps else recordings[number].period,
+            holds=data.holds[number],
         )
 
     def on(self, drives: Sequence[int], values: Mapping[str, float]) -> RobotOnGround:

@@ -18,6 +18,7 @@ from ddagr_gym.parameters import STANDARD_GRAVITY, Robot
 from ddagr_gym.physics import layout
 from ddagr_gym.physics.effects import Effect
 from ddagr_gym.physics.effects.base import Action
+from ddagr_gym.physics.effects.linear_action import acted_on, linear_part
 
 Array = NDArray[np.float64]
 
@@ -173,23 +174,12 @@ def _map(effects: Sequence[Effect], point: int, place: int, size: int) -> tuple[
 
 def _linear(action: Action, effect: Effect, place: int, size: int) -> LinearMap | None:
     """An action as a map of ``size`` entries from ``place`` on; None where it is none that can be undone."""
-
-    def result(values: Array, motion: float) -> tuple[Array, bool]:
-        row, memory = np.zeros(layout.SIZE), np.zeros(layout.EFFECT_MEMORY)
-        row[layout.SAMPLE_PERIOD], row[layout.GRAVITY + 2] = _PERIOD, -STANDARD_GRAVITY
-        row[layout.ACCELEROMETER_SCALE : layout.ACCELEROMETER_SCALE + 2] = 1.0
-        row[[layout.V_X, layout.YAW_RATE, layout.MEAN_YAW_ACCELERATION, layout.OMEGA]] = motion
-        row[place : place + size] = values
-        action(row, effect.vector(), memory)
-        return row[place : place + size].copy(), bool(memory.any())
-
-    offset, remembers = result(np.zeros(size), 0.0)
-    columns = [result(unit, 0.0) for unit in np.eye(size)]
-    matrix = np.column_stack([values - offset for values, _ in columns])
-    if remembers or any(own for _, own in columns) or abs(np.linalg.det(matrix)) < _LEAST_DETERMINANT:
+    found = linear_part(action, effect, place, size)
+    matrix, offset = found.matrix, found.offset
+    if found.remembers or abs(np.linalg.det(matrix)) < _LEAST_DETERMINANT:
         return None
     tried = np.linspace(-0.7, 1.1, size)
-    moving = result(tried, _MOVING)[0]
+    moving, _ = acted_on(action, effect, place, tried, _MOVING)
     is_linear = np.abs(moving - (matrix @ tried + offset)).max() <= _TOLERANCE
     changes = np.abs(matrix - np.eye(size)).max() > _TOLERANCE or np.abs(offset).max() > _TOLERANCE
     return LinearMap(matrix, offset) if is_linear and changes else None

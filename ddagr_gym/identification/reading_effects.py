@@ -7,9 +7,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ddagr_gym.parameters import STANDARD_GRAVITY
 from ddagr_gym.physics import layout
 from ddagr_gym.physics.effects import Effect
+from ddagr_gym.physics.effects.linear_action import linear_part
 
 Array = NDArray[np.float64]
 Chosen = NDArray[np.bool_]
@@ -49,15 +49,9 @@ def reading_gain(effect: Effect) -> Array:
 
     Of an effect that remembers readings it is taken for 1: a constant has gone through.
     """
-    actions = [action for point, action in effect.acting if point == layout.POINT_READINGS]
-    readings = []
-    for added in (np.zeros(INERTIAL), *np.eye(INERTIAL)):
-        row, memory = np.zeros(layout.SIZE), np.zeros(layout.EFFECT_MEMORY)
-        row[layout.SAMPLE_PERIOD], row[layout.GRAVITY + 2] = 1.0, -STANDARD_GRAVITY
-        row[layout.READING : layout.READING + INERTIAL] = added
-        for action in actions:
-            action(row, effect.vector(), memory)
-        if memory.any():
-            return np.eye(INERTIAL)
-        readings.append(row[layout.READING : layout.READING + INERTIAL].copy())
-    return np.stack(readings[1:], axis=1) - readings[0][:, None]
+    gain = np.eye(INERTIAL)
+    for point, action in effect.acting:
+        if point == layout.POINT_READINGS:
+            part = linear_part(action, effect, layout.READING, INERTIAL)
+            gain = gain if part.remembers else part.matrix @ gain
+    return gain

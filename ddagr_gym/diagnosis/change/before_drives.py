@@ -122,7 +122,7 @@ def robot_of_before(
         progress(f"every effect of the library in {recording.meta.source}")
         drive = OrdinaryDrive(
             recording.meta.source, GROUND, False, recording, joint.robot, joint.soil, parameters, joint.same_ground,
-            mended.reversed_gyro is not None, joint.slope,
+            mended.reversed_gyro is not None, joint.slope, holds=mended.holds,
         )  # fmt: skip
         scanned.append(scan_pieces(drive, joint.weighing, most, threads))
     scatter = measured_scatter()

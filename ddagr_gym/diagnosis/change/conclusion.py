@@ -242,7 +242,7 @@ def _slope_before(slope: GroundSlope) -> SlopeBefore:
 
 def _not_compared(ordinary: OrdinaryRobot, unnamed: Mapping[str, str]) -> Mapping[str, str]:
     """Effects that could not be named, with the reason; readings that repeat longer than before are seen in values."""
-    seen = ordinary.given or ordinary.usual_holds is not None
+    seen = ordinary.usual_holds is not None
     never = {name: why for name, why in NOT_COMPARED.items() if not (seen and name == SensorHold.name)}
     return {**{name: why for name, why in unnamed.items() if name not in NOT_COMPARED}, **never}
 

@@ -131,8 +131,10 @@ def _shift(compared: Compared, found: Contrast, looks: int) -> Shift:
     covariance = sizes.within + between
     probability = probability_of(candidate.has_sizes, sizes.value, covariance, found.degrees)
     nothing = np.zeros(len(compared.keys))
-    degrees = (found.degrees, probability, found.degrees, found.degrees)
-    return Shift(compared, sizes.value, nothing, covariance, between, *degrees, looks, apart=True)
+    return Shift(
+        compared, sizes.value, nothing, covariance, between, found.degrees, probability,
+        drives=found.degrees, few=found.degrees, looks=looks, apart=True,
+    )  # fmt: skip
 
 
 def in_order(windows: WindowSet) -> Integers:

@@ -236,12 +236,11 @@ class OrdinaryRobot:
     @property
     def usual_holds(self) -> dict[str, float] | None:
         """Longest time for which ordinary drives repeat readings, by sensor [s]; None in files of before."""
-        found: dict[str, float] = {}
-        for item in self.references:
-            if item.holds is None:
-                return None
-            found = {**found, **{name: max(time, found.get(name, 0.0)) for name, time in item.holds.items()}}
-        return found
+        known = [item.holds for item in self.references if item.holds is not None]
+        if len(known) < len(self.references):
+            return None
+        sensors = dict.fromkeys(name for holds in known for name in holds)
+        return {name: max(holds.get(name, 0.0) for holds in known) for name in sensors}
 
     @property
     def _unscanned(self) -> dict[str, str]:

@@ -40,6 +40,7 @@ class OrdinaryDrive:
         slope: of its ground; None where that is not known.
         on_ground: the robot on its ground, without the drive; nothing where no other drive was on it.
         logger: period of the rows [s] where no other drive was read with its column map; else 0.
+        holds: by sensor, time for which it repeats its readings [s].
     """
 
     name: str
@@ -54,6 +55,7 @@ class OrdinaryDrive:
     slope: GroundSlope | None = None
     on_ground: RobotOnGround = field(default_factory=RobotOnGround)
     logger: float = 0.0
+    holds: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def robot_there(self) -> Robot:
@@ -139,4 +141,5 @@ def _reference(drive: OrdinaryDrive, scan: DriveScan, other: Priors, losses: Arr
         on_ground=drive.on_ground,
         column_map=drive.recording.meta.column_map,
         period=drive.recording.period,
+        holds=drive.holds,
     )

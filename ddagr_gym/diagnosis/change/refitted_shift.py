@@ -56,7 +56,7 @@ def refitted_shift(
     farther = _farther(shift, size) if stretched else 1.0
     between = farther**2 * shift.between
     covariance = further.within / np.outer(away, away) + between
-    degrees = shift.few if stretched else shift.degrees
+    degrees = shift.few
     if not (stretched or shift.apart):
         degrees = degrees_of_freedom(covariance, between, shift.drives, further.windows)
     probability = probability_of(True, value, covariance, degrees)

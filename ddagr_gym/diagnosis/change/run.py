@@ -89,7 +89,7 @@ def what_changed(
     certified = _certified(problem, ordinary, named)
     diagnosis, effects = conclude_change(problem, mended, ordinary, ground, named, certified)
     diagnosis = _timed(diagnosis, problem, named)
-    held = new_holds(mended, ordinary.usual_holds if usual is None else usual.holds)
+    held = new_holds(mended, ordinary.usual_holds)
     diagnosis = with_new_faults(diagnosis, mended, usual, held)
     effects = ((hold_effect(held),) if held else ()) + effects
     diagnosis = replace(diagnosis, checks=doubts, seconds=time.monotonic() - began)

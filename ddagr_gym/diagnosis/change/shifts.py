@@ -67,7 +67,8 @@ class Shift:
         between: (k, k) share of ordinary drives in it.
         degrees: of freedom, equation (3).
         probability: of an ordinary drive to show as much, for this candidate alone.
-        drives: degrees of freedom with which the share of ordinary drives is known, d'.
+        drives: degrees of freedom with which the share of ordinary drives is known, d'; of what is against the rest of
+            the drive, those of the windows.
         few: the same without equation (4), d0 + d_r.
         looks: as how many tests it counts: in so many parts of the drive it was looked for.
         apart: whether it is against the rest of the drive in place of ordinary drives.
@@ -96,8 +97,7 @@ class Shift:
 
     def detectable(self, tests: int) -> Array:
         """(k,) multiples of each probe alone that pass the limit with the power."""
-        reach = distance_found(self.limit(tests), len(self.value), self.degrees)
-        return np.asarray(reach / np.sqrt(np.diag(np.linalg.inv(self.covariance))))
+        return least_found(self.covariance, self.degrees, single_level(tests * self.looks))
 
 
 def single_level(tests: int) -> float:
@@ -115,6 +115,19 @@ def distance_at(level: float, dimension: int, degrees: float) -> float:
     from scipy.special import fdtri
 
     return float(np.sqrt(dimension * fdtri(dimension, degrees, 1.0 - level)))
+
+
+def least_found(covariance: Array, degrees: float, level: float) -> Array:
+    """(k,) sizes, each alone, that pass the limit of a level with :data:`POWER`.
+
+    Args:
+        covariance: (k, k) of sizes.
+        degrees: of freedom.
+        level: of a single test.
+    """
+    k = len(covariance)
+    reach = distance_found(distance_at(level, k, degrees), k, degrees)
+    return np.asarray(reach / np.sqrt(np.diag(np.linalg.inv(covariance))))
 
 
 def distance_found(limit: float, dimension: int, degrees: float) -> float:

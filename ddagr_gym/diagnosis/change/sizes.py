@@ -54,17 +54,12 @@ def sizes_of(scores: Scores, keys: Sequence[str], ridge: Array, beside: Sequence
     prior = np.concatenate([ridge, np.zeros(len(known))]) + NOTHING * np.diag(inner)
     inverse = np.asarray(np.linalg.inv(inner + np.diag(prior))[:k], dtype=np.float64)
     gradient = scores.gradient[rows]
-    within = (
-        inverse
-        @ _within(scores, rows, np.asarray(np.linalg.solve(inner + np.diag(prior), gradient), dtype=np.float64))
-        @ inverse.T
-    )
+    sizes = np.asarray(np.linalg.solve(inner + np.diag(prior), gradient), dtype=np.float64)
+    scatter, windows = _of_windows(scores, rows, sizes, inverse)
+    within = inverse @ scatter @ inverse.T
     expected = scores.between[np.ix_(rows, rows)]
     # what independent readings make of the gradient, without what the priors do: that is between drives
     independent = inverse @ (inner - expected) @ inverse.T
-    windows = 0.0
-    if scores.informations is not None:
-        windows = windows_in_effect(inverse @ scores.informations[:, rows][:, :, rows] @ inverse.T)
     return Sizes(inverse @ gradient, at_least(within, independent), inverse @ expected @ inverse.T, windows)
 
 
@@ -103,14 +98,16 @@ def explained(scores: Scores, keys: Sequence[str], ridge: Array, beside: Sequenc
     return falls[0] - falls[1]
 
 
-def _within(scores: Scores, rows: Sequence[int], sizes: Array) -> Array:
-    """Covariance of the gradient by the windows' scatter, at the sizes where the windows are known.
+def _of_windows(scores: Scores, rows: Sequence[int], sizes: Array, inverse: Array) -> tuple[Array, float]:
+    """Covariance of the gradient by the windows' scatter at some sizes, and how many windows tell it (0: only sums).
 
     At nothing a large size would count as scatter of the windows that show it.
     """
     if scores.gradients is None or scores.informations is None:
-        return np.asarray(scores.within[np.ix_(rows, rows)])
-    return scattered(scores.gradients[:, rows] - scores.informations[:, rows][:, :, rows] @ sizes)
+        return np.asarray(scores.within[np.ix_(rows, rows)]), 0.0
+    informations = scores.informations[:, rows][:, :, rows]
+    scatter = scattered(scores.gradients[:, rows] - informations @ sizes)
+    return scatter, windows_in_effect(inverse @ informations @ inverse.T)
 
 
 def at_least(scattered: Array, independent: Array) -> Array:
